@@ -241,34 +241,33 @@ static void write_match(const orb_match_facts *match, api_text *out) {
 /* The same request with the pairs of an alternative as landmarks, which the default method pins. Each landmark has the
  * confidence 1 / cost, since it was found, not given. */
 static void write_alternative_request(const api_supermesh_request *request, const orb_alternative *alternative,
-                                      const api_place *spots, api_text *out) {
+                                      api_place *spots, api_text *out) {
   api_landmark_spec items[ORB_ALTERNATIVE_PAIRS];
-  api_place places[2 * ORB_ALTERNATIVE_PAIRS];
   api_supermesh_request changed = *request;
   memset(items, 0, sizeof items);
-  memcpy(places, spots, 2 * (size_t)alternative->count * sizeof *spots);
   for (int32_t i = 0; i < alternative->count; i++) {
     snprintf(items[i].name, sizeof items[i].name, "pair %d", i + 1);
     items[i].confidence = fmin(1, 1 / alternative->cost);
     items[i].weight = 1;
   }
-  changed.landmarks = (api_landmark_list){alternative->count, 2, items, places};
+  changed.landmarks = (api_landmark_list){alternative->count, request->shape_count, items, spots};
   changed.merge.align.method = ORB_ALIGN_PIN;
   api_supermesh_request_write(&changed, out);
 }
 
-static void write_alternatives(const api_supermesh_request *request, const orb_alignment *alignment,
-                               const api_place *spots, api_text *out) {
+static void write_alternatives(const api_supermesh_request *request, const orb_alignment *alignment, api_place *spots,
+                               api_text *out) {
   api_json_key(out, "alternatives");
   api_json_open(out, '[');
   for (int32_t i = 0; i < alignment->alternative_count; i++) {
     const orb_alternative *one = &alignment->alternatives[i];
     api_json_open(out, '{');
     api_json_member_number(out, "cost", one->cost);
+    api_json_member_integer(out, "shape", one->shape);
     api_json_key(out, "request");
     write_alternative_request(request, one, spots, out);
     api_json_close(out, '}');
-    spots += 2 * (size_t)one->count;
+    spots += (size_t)one->count * (size_t)request->shape_count;
   }
   api_json_close(out, ']');
 }
@@ -323,7 +322,7 @@ static void write_profiles(const orb_profile_facts *profiles, api_text *out) {
 }
 
 void api_supermesh_write(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
-                         const api_place *found, const api_place *others, const api_place *meant, double embed_ms,
+                         const api_place *found, api_place *others, const api_place *meant, double embed_ms,
                          int64_t created, api_text *out) {
   api_text canonical = {0};
   api_supermesh_request_write(request, &canonical);

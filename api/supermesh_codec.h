@@ -8,7 +8,7 @@
  * request would name them, found_count × shape_count places; others: likewise those of all alternatives, one after the
  * other; meant: where each suspect would lie. */
 void api_supermesh_write(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
-                         const api_place *found, const api_place *others, const api_place *meant, double embed_ms,
+                         const api_place *found, api_place *others, const api_place *meant, double embed_ms,
                          int64_t created, api_text *out);
 /* Appends the summary of a supermesh: its description without report and request. 0: the description is no such JSON,
  * and nothing is appended. */

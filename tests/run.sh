@@ -6,7 +6,7 @@
 #   packages   installs what the tests need: Debian packages, Node, npm packages
 #   build      builds the studio and the release build, with warnings as errors
 #   asan       unit and scenario tests, in a build with AddressSanitizer and UndefinedBehaviorSanitizer
-#   release    every test, in the release build
+#   release    every test, in the release build; in a full run without the scenarios that asan has run
 #   fuzz       each fuzz target for ORB_FUZZ_SECONDS (10)
 #   core       only the library and its unit tests, where the daemon does not build; not part of a full run
 #
@@ -59,13 +59,18 @@ count_junit() {
     /^[ \t]*<\/testcase>/ { print end }' "$1"
 }
 
-# Its daemon takes the numeric objects of the release build. Scenarios that look at documents and programs, not at what a
-# daemon does, run in the release build only, as do those that run a second time with PostgreSQL: its unit tests run here.
+# Its daemon takes the numeric objects of the release build. So scenarios that mostly compute, and those that look at
+# documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL: its unit tests
+# run here.
+release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|.*_postgresql'
+# These run with sanitizers and SQLite; the release build runs the first four with PostgreSQL.
+asan_only='supermeshes|meshes|jobs|tenants|durability|crash'
 step_asan() {
+  rm -f build-asan/tests.xml
   build_release
   cmake --preset asan -DORB_TESTS=ON -DORB_PLAIN="$PWD/build" >/dev/null
   cmake --build build-asan
-  run_tests build-asan -R '^(unit|scenario)\.' -E '^scenario\.(openapi_tools|shell|.*_postgresql)$'
+  run_tests build-asan -R '^(unit|scenario)\.' -E "^scenario\.($release_only)\$"
 }
 
 # From one seed, so that two runs try much the same inputs; long runs look for new ones.
@@ -80,11 +85,14 @@ step_fuzz() {
 
 step_release() {
   build_release
+  local without=()
   if [ -n "$browser" ]; then
-    run_tests build -LE browser
-  else
-    run_tests build
+    without+=(-LE browser)
+    if [ -f build-asan/tests.xml ]; then
+      without+=(-E "^scenario\.($asan_only)\$")
+    fi
   fi
+  run_tests build "${without[@]}"
 }
 
 # Starts the release build's tests in a browser beside the steps that follow. They have a folder of their own, as two

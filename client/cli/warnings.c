@@ -114,10 +114,10 @@ static int warn_of_match(FILE *out, const char *bullet, const cJSON *supermesh) 
   }
   fprintf(out, "%sNot sure: the shapes may be matched wrongly, such as a left leg with a right one (confidence %.2f). ",
           bullet, cli_number(match, "confidence"));
-  if (others) {
-    fprintf(out, "Set landmarks, or send one of the %d request%s in `alternatives`.\n", others, others == 1 ? "" : "s");
+  if (others > 1) {
+    fprintf(out, "Set landmarks, or send one of the %d requests in `alternatives`.\n", others);
   } else {
-    fputs("Set landmarks.\n", out);
+    fputs(others ? "Set landmarks, or send the request in `alternatives`.\n" : "Set landmarks.\n", out);
   }
   return 1;
 }

@@ -183,27 +183,101 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   return ORB_OK;
 }
 
-/* Lists the other maps of the only match as places. */
-static orb_status write_alternatives(orb_context *ctx, const orb_align_shape *shapes, const orb_match *match,
-                                     orb_alignment *out) {
-  out->alternatives = ORB_NEW0(ctx, orb_alternative, ORB_ALTERNATIVES_MAX);
-  if (!out->alternatives) {
+/* The vertex of a shape that its match takes nearest to a point of the first shape. */
+static int32_t partner_of(const orb_mesh *mesh, const double *target, const double point[3]) {
+  int32_t best = 0;
+  double least = INFINITY;
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    const double *t = target + 3 * (size_t)v;
+    double x = t[0] - point[0], y = t[1] - point[1], z = t[2] - point[2], d = x * x + y * y + z * z;
+    if (d < least) {
+      least = d;
+      best = v;
+    }
+  }
+  return best;
+}
+
+/* The vertices that correspond if `other` is the map of shape s and the best maps are those of the others. Returns how
+ * many; two pairs never share a vertex. `vertex`: as in matches. */
+static int32_t pairs_of_other(const orb_align_shape *shapes, const matches *m, int32_t s, const orb_match_other *other,
+                              int32_t *vertex) {
+  int32_t count = 0;
+  for (int32_t k = 0; k < other->pairs.count; k++) {
+    const double *point = shapes[0].mesh->positions + 3 * (size_t)other->pairs.first[k];
+    int is_free = 1;
+    for (int32_t t = 0; t < m->shape_count; t++) {
+      int32_t *row = vertex + (size_t)t * ORB_MATCH_PAIRS;
+      row[count] = t == 0   ? other->pairs.first[k]
+                   : t == s ? other->pairs.second[k]
+                            : partner_of(shapes[t].mesh, m->targets[t], point);
+      for (int32_t i = 0; i < count; i++) {
+        is_free = is_free && row[i] != row[count];
+      }
+    }
+    count += is_free;
+  }
+  return count;
+}
+
+/* Appends another map of shape s, as places, unless it has too few. */
+static orb_status write_alternative(orb_context *ctx, const orb_align_shape *shapes, const matches *m, int32_t s,
+                                    const orb_match_other *other, orb_alignment *out) {
+  const size_t shape_count = (size_t)m->shape_count;
+  orb_status status = ORB_OK;
+  int32_t *vertex = ORB_NEW(ctx, int32_t, ORB_MATCH_PAIRS * shape_count);
+  if (!vertex) {
     return ORB_E_NO_MEMORY;
   }
-  for (int32_t i = 0; i < match->other_count; i++) {
-    const orb_match_pairs *pairs = &match->other[i].pairs;
-    if (pairs->count < LEAST_PAIRS) {
-      continue;
+  const int32_t count = pairs_of_other(shapes, m, s, other, vertex);
+  if (count >= LEAST_PAIRS) {
+    orb_alternative *one = &out->alternatives[out->alternative_count];
+    one->at = ORB_NEW0(ctx, orb_place, (size_t)count * shape_count);
+    if (!one->at) {
+      status = ORB_E_NO_MEMORY;
+      goto end;
     }
-    orb_alternative *one = &out->alternatives[out->alternative_count++];
-    one->cost = fmin(match->other[i].cost, MOST_COST);
-    one->count = pairs->count;
-    for (int32_t k = 0; k < pairs->count; k++) {
-      ORB_TRY(orb_place_of_vertex(ctx, shapes[0].mesh, pairs->first[k], &one->at[2 * k]));
-      ORB_TRY(orb_place_of_vertex(ctx, shapes[1].mesh, pairs->second[k], &one->at[2 * k + 1]));
+    out->alternative_count++;
+    one->cost = fmin(other->cost, MOST_COST);
+    one->shape = s;
+    one->count = count;
+    for (size_t i = 0; i < (size_t)count * shape_count; i++) {
+      const size_t t = i % shape_count;
+      ORB_GO(status,
+             orb_place_of_vertex(ctx, shapes[t].mesh, vertex[t * ORB_MATCH_PAIRS + i / shape_count], &one->at[i]), end);
     }
   }
-  return ORB_OK;
+end:
+  orb_free(ctx, vertex);
+  return status;
+}
+
+/* Lists the cheapest other maps of all matches. Those of one match come by rising cost. */
+static orb_status write_alternatives(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
+                                     orb_alignment *out) {
+  orb_status status = ORB_OK;
+  int32_t *next = ORB_NEW0(ctx, int32_t, m->shape_count);
+  out->alternatives = ORB_NEW0(ctx, orb_alternative, ORB_ALTERNATIVES_MAX);
+  if (!next || !out->alternatives) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  while (out->alternative_count < ORB_ALTERNATIVES_MAX) {
+    int32_t best = 0;
+    for (int32_t s = 1; s < m->shape_count; s++) {
+      if (next[s] < m->of[s].other_count &&
+          (best == 0 || m->of[s].other[next[s]].cost < m->of[best].other[next[best]].cost)) {
+        best = s;
+      }
+    }
+    if (best == 0) {
+      break;
+    }
+    ORB_GO(status, write_alternative(ctx, shapes, m, best, &m->of[best].other[next[best]++], out), end);
+  }
+end:
+  orb_free(ctx, next);
+  return status;
 }
 
 /* What a caller may know of the matches: how sure the best ones are, and the next ones. */
@@ -216,7 +290,7 @@ static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shap
   out->match.bend = m->bend;
   out->match.clear = m->clear;
   out->match.confidence = orb_match_confidence(m->bend, m->clear, out->energy);
-  return m->shape_count == 2 ? write_alternatives(ctx, shapes, &m->of[1], out) : ORB_OK;
+  return write_alternatives(ctx, shapes, m, out);
 }
 
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,

@@ -4,12 +4,12 @@
  *   char[8] "ORBALIGN", uint32 version, uint32 0x01020304 (byte order)
  *   int32 shapes, landmarks, found; double energy
  *   int32 1 and double bend, clear, confidence of the match, or 0
- *   int32 alternatives; for each double cost, int32 count, count × 2 places (int32 triangle, double[3])
- *   int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place
- *   found × shapes places, found × double[3] points, found × double confidence
- *   for each shape: int32 vertices, triangles, changed; double[3] point of each vertex; position and int32 source of
- * each added vertex; the changed triangles, each with its number, corners, parent, source_triangle, material and the
- *   attributes of its corners, where the mesh has them; int32 1 and the vertex of each landmark, or 0
+ *   int32 alternatives; for each double cost, int32 shape, int32 count, count × shapes places (int32 triangle,
+ * double[3]) int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place found ×
+ * shapes places, found × double[3] points, found × double confidence for each shape: int32 vertices, triangles,
+ * changed; double[3] point of each vertex; position and int32 source of each added vertex; the changed triangles, each
+ * with its number, corners, parent, source_triangle, material and the attributes of its corners, where the mesh has
+ * them; int32 1 and the vertex of each landmark, or 0
  *
  * A triangle that is not listed is that of the given mesh, with itself as parent. */
 #include "orbmorph/kept.h"
@@ -21,7 +21,7 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { VERSION = 3, BYTE_ORDER_MARK = 0x01020304 };
+enum { VERSION = 4, BYTE_ORDER_MARK = 0x01020304 };
 static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 
 /* A new member of the alignment must be written and read here, with a new VERSION. */
@@ -153,8 +153,9 @@ static void put_match(writer *w, const orb_alignment *a) {
   for (int32_t i = 0; i < a->alternative_count; i++) {
     const orb_alternative *one = &a->alternatives[i];
     put(w, &one->cost, sizeof one->cost);
+    put_integer(w, one->shape);
     put_integer(w, one->count);
-    put_places(w, one->at, 2 * (size_t)one->count);
+    put_places(w, one->at, (size_t)one->count * (size_t)a->shape_count);
   }
 }
 
@@ -364,7 +365,7 @@ static orb_status take_match(orb_context *ctx, reader *r, const orb_align_shape 
     take(r, &out->match.clear, sizeof out->match.clear);
     take(r, &out->match.confidence, sizeof out->match.confidence);
   }
-  const int32_t count = take_integer(r, 0, out->shape_count == 2 ? ORB_ALTERNATIVES_MAX : 0);
+  const int32_t count = take_integer(r, 0, out->shape_count > 1 ? ORB_ALTERNATIVES_MAX : 0);
   if (count == 0) {
     return ORB_OK;
   }
@@ -376,8 +377,14 @@ static orb_status take_match(orb_context *ctx, reader *r, const orb_align_shape 
   for (int32_t i = 0; i < count; i++) {
     orb_alternative *one = &out->alternatives[i];
     take(r, &one->cost, sizeof one->cost);
+    one->shape = take_integer(r, 1, out->shape_count - 1);
     one->count = take_integer(r, 0, ORB_ALTERNATIVE_PAIRS);
-    take_places(r, shapes, 2, one->at, 2 * (size_t)one->count);
+    const size_t places = (size_t)one->count * (size_t)out->shape_count;
+    one->at = ORB_NEW0(ctx, orb_place, places);
+    if (!one->at) {
+      return ORB_E_NO_MEMORY;
+    }
+    take_places(r, shapes, (size_t)out->shape_count, one->at, places);
   }
   return ORB_OK;
 }

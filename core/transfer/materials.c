@@ -195,12 +195,21 @@ static orb_status drop_textures(orb_context *ctx, const orb_mesh *mesh, const or
   return ORB_OK;
 }
 
+/* Whether a file has textures; those of a 3MF are not read, which its mesh notes. */
+static int has_textures(const orb_mesh *mesh) {
+  int found = mesh->image_count > 0;
+  for (int32_t i = 0; i < mesh->dropped_count; i++) {
+    found = found || strcmp(mesh->dropped[i].what, "texture2dgroup") == 0;
+  }
+  return found;
+}
+
 orb_status orb_dropped_later(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count, orb_dropped **list,
                              int32_t *count) {
   for (int32_t s = 1; s < shape_count; s++) {
     char where[32];
     (void)snprintf(where, sizeof where, "shapes[%d]", s);
-    if (shapes[s].mesh.image_count > 0) {
+    if (has_textures(&shapes[s].mesh)) {
       ORB_TRY(
           orb_dropped_add(ctx, list, count, "textures", where, "The materials of the asset are the first shape's."));
     }

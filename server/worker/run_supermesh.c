@@ -195,12 +195,12 @@ static api_place *found_spots(orb_context *ctx, const merge_input *in, const orb
 
 /* Places of all alternatives, one after the other. NULL if out of memory. */
 static api_place *other_spots(orb_context *ctx, const merge_input *in, const orb_alignment *alignment) {
-  enum { MOST = 2 * ORB_ALTERNATIVE_PAIRS };
-  api_place *spots = orb_alloc(ctx, (size_t)ORB_ALTERNATIVES_MAX * MOST, sizeof *spots), *next = spots;
+  const size_t shapes = (size_t)in->request.shape_count, most = ORB_ALTERNATIVES_MAX * ORB_ALTERNATIVE_PAIRS * shapes;
+  api_place *spots = orb_alloc(ctx, most, sizeof *spots), *next = spots;
   for (int32_t a = 0; spots && a < alignment->alternative_count; a++) {
     const orb_alternative *one = &alignment->alternatives[a];
-    for (size_t i = 0; i < 2 * (size_t)one->count; i++) {
-      write_spot(in, i % 2, &one->at[i], next++);
+    for (size_t i = 0; i < (size_t)one->count * shapes; i++) {
+      write_spot(in, i % shapes, &one->at[i], next++);
     }
   }
   return spots;

@@ -56,8 +56,8 @@ test('the request of an alternative is answered, with another map', async (t) =>
   assert.equal(match.verdict, match.confidence >= 0.8 ? 'sure' : match.confidence >= 0.5 ? 'likely' : 'unsure');
   assert.ok(alternatives.length >= 1 && alternatives.length <= 4, `${alternatives.length}`);
   let before = 1;
-  for (const { cost, request } of alternatives) {
-    assert.ok(cost >= before);
+  for (const { cost, shape, request } of alternatives) {
+    assert.ok(cost >= before && shape === 1);
     before = cost;
     // the same request, but for the landmarks and the method that meets them
     const { landmarks, align, ...others } = request;
@@ -89,15 +89,49 @@ test('the request of an alternative is answered, with another map', async (t) =>
   assert.ok(most > 0.5, `${most}`);
 });
 
-test('three shapes have a verdict and no alternatives; rotations alone have neither', async (t) => {
+test('of three shapes, an alternative matches one otherwise and leaves the others', async (t) => {
   const d = await daemon(t);
-  const shapes = await upload(d, knobbed(2, 1), knobbed(2, 0.8), egg(2));
-  const remesh = { method: 'adaptive', tolerance: 0.05 };
-  const three = await d.made('/v1/supermeshes', { shapes, remesh });
-  assert.ok(three.match.confidence >= 0);
-  assert.deepEqual(three.alternatives, []);
+  const bodies = [knobbed(3, 1), knobbed(3, 0.8), knobbed(3, 0.9)];
+  const shapes = await upload(d, ...bodies);
+  const remesh = { method: 'adaptive', tolerance: 0.001 };
+  const asset = { fit: 'none', animation: 'none' };
+  const first = await d.made('/v1/supermeshes', { shapes, remesh, asset });
+  assert.ok(first.match.confidence >= 0);
+  const { alternatives } = first;
+  assert.ok(alternatives.length >= 1 && alternatives.length <= 4, `${alternatives.length}`);
+  alternatives.forEach(({ cost }, i) => assert.ok(cost >= (i ? alternatives[i - 1].cost : 1)));
+  const [{ shape, request }] = alternatives;
+  assert.ok(shape === 1 || shape === 2);
+  for (const { at } of request.landmarks) assert.equal(at.length, 3);
+  const reply = await d.post('/v1/supermeshes', request, { headers: { prefer: 'wait=60' } });
+  assert.equal(reply.status, 200, reply.bytes.toString());
+  for (const l of reply.json.landmarks) for (const r of l.residual_relative) assert.ok(r < 1e-6, `${l.name}: ${r}`);
+  // The first map takes the places of the other shapes nearly together, and some of the one shape elsewhere.
+  const { shapes: found, count } = morphOf((await d.get(first.asset)).bytes);
+  const at = (s, v) => found[s].slice(3 * v, 3 * v + 3);
+  const apart = (p, q) => Math.hypot(...p.map((x, k) => x - q[k]));
+  const most = [0, 0, 0];
+  for (const { at: places } of request.landmarks) {
+    const points = places.map((p, s) => place(p, bodies[s]));
+    let best = 0;
+    for (let v = 1; v < count; v++) if (apart(at(0, v), points[0]) < apart(at(0, best), points[0])) best = v;
+    points.forEach((p, s) => (most[s] = Math.max(most[s], apart(at(s, best), p))));
+  }
+  assert.ok(most[shape] > 0.5 && most[3 - shape] < 0.3, `${shape}: ${most}`);
+  // A kept alignment has the same alternatives.
+  const kept = await d.made('/v1/supermeshes', { shapes, remesh: { ...remesh, tolerance: 0.02 }, asset });
+  assert.equal(kept.timings_ms.align, 0);
+  assert.deepEqual(
+    kept.alternatives.map((a) => [a.shape, a.cost, a.request.landmarks]),
+    alternatives.map((a) => [a.shape, a.cost, a.request.landmarks]),
+  );
+});
+
+test('rotations alone have neither verdict nor alternatives', async (t) => {
+  const d = await daemon(t);
+  const shapes = await upload(d, knobbed(2, 1), egg(2));
   const align = { method: 'auto', options: { preset: 'fast' } };
-  const fast = await d.made('/v1/supermeshes', { shapes: shapes.slice(0, 2), remesh, align });
+  const fast = await d.made('/v1/supermeshes', { shapes, remesh: { method: 'adaptive', tolerance: 0.05 }, align });
   assert.equal(fast.match, undefined);
   assert.deepEqual(fast.alternatives, []);
 });
@@ -116,6 +150,7 @@ test('the client says where a match is not sure, and calls only given landmarks 
   const said = await morph();
   assert.match(said, /match: unsure \(confidence 0\.[0-4]\d\)/);
   assert.equal(said.match(/Not sure: the shapes may be matched wrongly/g).length, 2, 'printed and in the report');
+  assert.match(said, /or send the request in `alternatives`\./, 'there is one');
   assert.doesNotMatch(said, /exact/);
   const [{ id }] = (await d.get('/v1/supermeshes')).json.supermeshes;
   const { alternatives } = (await d.get(`/v1/supermeshes/${id}`)).json;

@@ -1,10 +1,11 @@
 // Files as people have them: compressed and quantized glTF, 3MF, and files of other kinds, which the refusal names.
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
-import { readFile } from 'node:fs/promises';
+import { readFile, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import path from 'node:path';
 import test from 'node:test';
+import { folder, run } from './support/cli.mjs';
 import { assertProblem, daemon, root, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
@@ -185,6 +186,41 @@ test('3MF is read: units, placement and materials of the file, by whichever prog
   // 128 of 255 in sRGB
   for (const [k, linear] of [1, ((128 / 255 + 0.055) / 1.055) ** 2.4, 0, 1].entries())
     assert.ok(Math.abs(pla[k] - linear) < 1e-4, `${pla}`);
+});
+
+test('the textures of a 3MF are named as dropped, and doctor examines such files', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const egg = shapes.egg();
+  const xmlns = 'http://schemas.microsoft.com/3dmanufacturing/material/2015/02';
+  const textured = shapes
+    .xmlOf3mf(egg)
+    .replace('<resources>', `<resources><t:texture2dgroup xmlns:t="${xmlns}" id="21" texid="20"/>`);
+  const { id: base } = (await d.upload(shapes.package3mf(textured))).json;
+  const { id: other } = (await d.upload(shapes.obj(shapes.ball(3)))).json;
+  const dropped = async (...ids) => {
+    const request = { shapes: ids.map((mesh) => ({ mesh })), align: { method: 'rotate' }, remesh: { tolerance: 0.02 } };
+    return (await d.made('/v1/supermeshes', request)).dropped.map(({ what, where, why }) => [what, where, why]);
+  };
+  assert.deepEqual(await dropped(base, other), [
+    ['texture2dgroup', '', 'The reader takes colours from 3MF, no textures.'],
+  ]);
+  assert.deepEqual(await dropped(other, base), [
+    ['textures', 'shapes[1]', "The materials of the asset are the first shape's."],
+  ]);
+
+  const at = await folder(t);
+  const files = { whole: egg, open: { ...egg, triangles: egg.triangles.slice(1) }, ring: shapes.torus() };
+  for (const [name, mesh] of Object.entries(files)) await writeFile(path.join(at, `${name}.3mf`), shapes.threeMf(mesh));
+  const examined = async (name) => run(['doctor', path.join(at, `${name}.3mf`)], { env });
+  const [whole, open, ring] = [await examined('whole'), await examined('open'), await examined('ring')];
+  assert.deepEqual([whole.code, open.code, ring.code], [0, 1, 1]);
+  assert.match(
+    whole.out,
+    new RegExp(`whole\\.3mf: healthy: closed, in one piece, genus 0, ${egg.triangles.length} triangles`),
+  );
+  assert.match(open.out, /helps: orbmorph upload --repair fill_holes .*open\.3mf/);
+  assert.match(ring.out, /handle: a loop of \d+ vertices/);
 });
 
 test('3MF that is damaged, or made to cost much, is refused', async (t) => {

@@ -1,9 +1,9 @@
 // Measures the studio with large shapes, and a bare three.js page that shows the same GLB in the same browser:
 //   node tests/studio/bench.mjs [LEVEL] [--software-compositing]
 // A shape has 20·4^LEVEL triangles; the default level is 7 (327,680 triangles). Prints one JSON object: the median
-// frame time (ms) of both pages while scrubbing, their ratio, and for each step the long tasks of the main thread with
-// their CPU time (see bench/tasks.mjs). A stub replaces the daemon, so that only the page (client/web/dist) is
-// measured. docs/bench-studio.md has the results.
+// frame times (ms) of both pages while scrubbing, the ratio of each round and their median, and for each step the long
+// tasks of the main thread with their CPU time (see bench/tasks.mjs). A stub replaces the daemon, so that only the page
+// (client/web/dist) is measured. docs/bench-studio.md has the results.
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -121,7 +121,8 @@ const frames = (page, step) =>
   }, step);
 const SCRUB =
   "const i = document.querySelector('.scrub input'); i.value = value; i.dispatchEvent(new Event('input', { bubbles: true }));";
-const middle = (list) => list.sort((a, b) => a - b)[list.length >> 1];
+const middle = (list) => list.toSorted((a, b) => a - b)[list.length >> 1];
+const ROUNDS = 7; // of both pages in turns, so that what else the machine does hits both
 const files = meshes.map((m, i) => {
   const path = join(folder, `shape${i}.obj`);
   writeFileSync(path, m.file);
@@ -181,10 +182,11 @@ try {
   });
   const studio = [];
   const plain = [];
-  for (let round = 0; round < 3; round++) {
+  for (let round = 0; round < ROUNDS; round++) {
     studio.push(await step('scrub', page, () => frames(page, SCRUB)));
     plain.push(await step('bare: scrub', bare, () => frames(bare, 'scrub(value)')));
   }
+  const ratios = studio.map((ms, i) => ms / plain[i]);
   await step('turn', page, async () => {
     await page.locator('.pane-view').first().focus();
     for (let i = 0; i < 10; i++) await page.keyboard.press('ArrowLeft');
@@ -203,7 +205,8 @@ try {
         compositing,
         studio_ms: middle(studio),
         bare_ms: middle(plain),
-        ratio: middle(studio) / middle(plain),
+        ratio: middle(ratios),
+        ratios: ratios.map((ratio) => Number(ratio.toFixed(2))),
         long_tasks: longest,
       },
       null,

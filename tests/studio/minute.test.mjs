@@ -414,7 +414,7 @@ test('a link whose morph or shapes are gone says so', async () => {
     await alert.waitFor();
     assert.match(await alert.innerText(), expected);
     await button(page, 'Dismiss').click();
-    assert.equal(await alert.count(), 0);
+    await alert.waitFor({ state: 'detached' });
     await done();
   }
 });

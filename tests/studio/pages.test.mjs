@@ -119,6 +119,12 @@ for (const colorScheme of ['light', 'dark'])
     await defaultShown(page);
     await button(page, 'Pause').click();
     found.morph = await findings(page);
+    for (const view of ['Side by side', 'Stretch']) {
+      await button(page, view, { exact: true }).click();
+      if (view === 'Stretch') await until(() => page.getByText(/^99 % of it below/).count(), 'it is measured');
+      else await page.locator('.pane-view').last().press('Enter');
+      found[view] = await findings(page);
+    }
     await button(page, 'Use it').click();
     found.share = await findings(page);
     await button(page, 'Close').click();

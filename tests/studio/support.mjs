@@ -76,8 +76,30 @@ export const startBrowser = ({ compositing = 'software' } = {}) =>
     ],
   });
 
-/** Opens a page in its own context. Responses of 4xx, which Chromium logs as errors, are allowed. */
-export async function openPage(browser, url, { hash = '', ...options } = {}) {
+/**
+ * At most eight frames a second on the page's main thread. What moves there draws as often as it gets frames, and software
+ * GL takes a core for each of them as long as the test lasts.
+ */
+function slowFrames() {
+  const [request, cancel] = [globalThis.requestAnimationFrame, globalThis.cancelAnimationFrame];
+  const waiting = new Map();
+  let count = 0;
+  globalThis.requestAnimationFrame = (call) => {
+    const id = ++count;
+    const draw = () => waiting.set(id, { frame: request((time) => waiting.delete(id) && call(time)) });
+    waiting.set(id, { timer: setTimeout(draw, 120) });
+    return id;
+  };
+  globalThis.cancelAnimationFrame = (id) => {
+    const { timer, frame } = waiting.get(id) ?? {};
+    waiting.delete(id);
+    clearTimeout(timer);
+    if (frame) cancel(frame);
+  };
+}
+
+/** Opens a page in its own context. `allFrames`: frames come as fast as they can. Responses of 4xx, which Chromium logs as errors, are allowed. */
+export async function openPage(browser, url, { hash = '', allFrames = false, ...options } = {}) {
   const context = await browser.newContext({
     viewport: { width: 1280, height: 800 },
     acceptDownloads: true,
@@ -85,6 +107,7 @@ export async function openPage(browser, url, { hash = '', ...options } = {}) {
   });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
+  if (!allFrames) await page.addInitScript(slowFrames);
   await page.addInitScript(() => {
     globalThis.shownToasts = []; // toasts disappear after some seconds
     new MutationObserver((changes) => {
@@ -115,7 +138,7 @@ export async function openPage(browser, url, { hash = '', ...options } = {}) {
 }
 
 /** Waits until `check` returns a true value, and returns it. */
-export async function until(check, what, limit = 900_000) {
+export async function until(check, what, limit = Number(process.env.ORB_LIMIT ?? 900_000)) {
   const end = Date.now() + limit;
   for (;;) {
     const value = await check();

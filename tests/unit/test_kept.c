@@ -44,8 +44,13 @@ static void check_same(const orb_alignment *a, const orb_alignment *b) {
   assert_memory_equal(&a->energy, &b->energy, sizeof a->energy); /* also NaN */
   assert_memory_equal(&a->match, &b->match, sizeof a->match);
   assert_int_equal(a->alternative_count, b->alternative_count);
-  if (a->alternative_count > 0) {
-    check_equal(a->alternatives, b->alternatives, (size_t)a->alternative_count, sizeof(orb_alternative));
+  for (int32_t i = 0; i < a->alternative_count; i++) {
+    const orb_alternative *x = &a->alternatives[i], *y = &b->alternatives[i];
+    assert_true(x->cost == y->cost && x->shape == y->shape && x->count == y->count);
+    for (size_t k = 0; k < (size_t)x->count * shapes; k++) {
+      assert_int_equal(x->at[k].triangle, y->at[k].triangle);
+      assert_memory_equal(x->at[k].at, y->at[k].at, sizeof x->at[k].at);
+    }
   }
   assert_int_equal(a->suspect_count, b->suspect_count);
   for (int32_t i = 0; i < a->suspect_count; i++) {

@@ -435,10 +435,12 @@ export type Supermesh = {
     /** How much the best rough map bends the shapes: 0 for a rigid motion. */
     bend: number;
   };
-  /** Other correspondences that the search considered, the best first; empty unless a correspondence of two shapes was found. Absent if an older engine made the supermesh. */
+  /** Other correspondences that the search considered, the best first; empty unless a correspondence was found. Absent if an older engine made the supermesh. */
   alternatives?: Array<{
     /** How much its rough map bends the shapes, as a multiple of the best one's. */
     cost: number;
+    /** The later shape that it matches otherwise; the others are matched as in this supermesh. Absent if an older engine made the supermesh. */
+    shape?: number;
     request: CanonicalRequest;
   }>;
   certificate: {

@@ -87,7 +87,11 @@ class Player {
     set({ mix: shares });
   }
 
+  /** of the targets, as they are shown */
+  weights: ArrayLike<number> = [];
+
   private setWeights(weights: ArrayLike<number>) {
+    this.weights = weights;
     this.result?.main.weights(weights);
     stage.draw();
   }

@@ -3,6 +3,7 @@ import type { Job, Landmark as WireLandmark, Mesh, Problem, Supermesh, Supermesh
 import { Orbmorph } from 'orbmorph';
 import type { MorphData } from './mesh/morph';
 import type { MeasureName, SphereData } from './mesh/distortion';
+import type { Other } from './mesh/others';
 import type { Spot } from './mesh/worker';
 import type { Model } from './view/models';
 
@@ -61,6 +62,8 @@ export interface Options {
   maxTriangles: number | null;
   path: 'linear' | 'rigid';
   fit: 'auto' | 'none' | 'rigid' | 'similarity';
+  /** what becomes of holes of the first shape that a repair has filled */
+  holes: 'reopen' | 'filled';
   repair: string;
 }
 
@@ -71,6 +74,7 @@ export const DEFAULTS: Options = {
   maxTriangles: null,
   path: 'linear',
   fit: 'auto',
+  holes: 'reopen',
   repair: 'safe',
 };
 
@@ -95,6 +99,13 @@ export interface Matches {
   requests: SupermeshRequest[];
   at: number; // the shown one
   tried?: number; // the last one that was sent
+  told?: Told; // once it is known
+}
+
+/** What the alternatives of a match do otherwise. */
+export interface Told {
+  landmarks: string[]; // the names of the found landmarks, to which the swaps refer
+  others: (Other & { cost: number; shape: number })[]; // in the order of the alternatives
 }
 
 export interface Result {
@@ -104,6 +115,8 @@ export interface Result {
   data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles'>;
   main: Model;
   each: Model[];
+  /** the shapes, painted by how much the morph stretches them, once that is measured */
+  stretch?: Model[];
 }
 
 export const presetOf = (result: Result) =>
@@ -135,7 +148,7 @@ export interface State {
   playing: boolean;
   motion: Motion;
   mix: number[] | null;
-  show: 'morph' | 'beside' | 'each' | 'error';
+  show: 'morph' | 'beside' | 'each' | 'stretch' | 'error';
   wire: boolean;
   /** wireframe of the common mesh on each shape, separate because that view is about its triangles */
   meshWire: boolean;

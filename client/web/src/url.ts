@@ -38,11 +38,11 @@ function decodePlace(text: string): Place | undefined {
 }
 
 function encodeOptions(o: Options): string {
-  return [o.remesh, o.tolerance, o.maxTriangles ?? '', o.path, o.fit, o.align].join(',');
+  return [o.remesh, o.tolerance, o.maxTriangles ?? '', o.path, o.fit, o.align, o.holes].join(',');
 }
 
 function decodeOptions(text: string): Options {
-  const [remesh, tolerance, most, path, fit, align] = text.split(',');
+  const [remesh, tolerance, most, path, fit, align, holes] = text.split(',');
   const from = <T extends string>(value: string, allowed: readonly T[], otherwise: T): T =>
     (allowed as readonly string[]).includes(value) ? (value as T) : otherwise;
   return {
@@ -52,6 +52,7 @@ function decodeOptions(text: string): Options {
     maxTriangles: Number(most) >= 4 ? Number(most) : null,
     path: from(path, ['linear', 'rigid'], DEFAULTS.path),
     fit: from(fit, ['auto', 'none', 'rigid', 'similarity'], DEFAULTS.fit),
+    holes: from(holes, ['reopen', 'filled'], DEFAULTS.holes),
     align: from(align, ['default', 'pin', 'rbf', 'rotate', 'auto'], DEFAULTS.align),
   };
 }
@@ -165,7 +166,7 @@ export async function restore() {
     if (state.result && query.get('side') === 'after') set({ side: 'after' });
     if (TABS.includes(tab) && state.shapes.length) set({ tab });
     const show = query.get('show');
-    if (state.result && (show === 'beside' || show === 'each' || show === 'error')) set({ show });
+    if (state.result && (show === 'beside' || show === 'each' || show === 'stretch' || show === 'error')) set({ show });
   } finally {
     restoring = false;
   }

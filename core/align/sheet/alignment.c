@@ -14,6 +14,9 @@ void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   orb_free(ctx, alignment->found);
   orb_free(ctx, alignment->confidence);
   orb_free(ctx, alignment->found_points);
+  for (int32_t i = 0; alignment->alternatives && i < alignment->alternative_count; i++) {
+    orb_free(ctx, alignment->alternatives[i].at);
+  }
   orb_free(ctx, alignment->alternatives);
   orb_free(ctx, alignment->suspects);
   memset(alignment, 0, sizeof *alignment);

@@ -50,12 +50,14 @@ typedef struct orb_aligned_shape {
 
 enum { ORB_FOUND_MAX = 12, ORB_ALTERNATIVES_MAX = 4, ORB_ALTERNATIVE_PAIRS = 12 };
 
-/* Another correspondence of two shapes that the search without landmarks considered. Its places lead to it if they are
- * given as landmarks. They are found, so they are only roughly at the same features. */
+/* Another correspondence that the search without landmarks considered. One later shape is matched otherwise, all others
+ * as in the best one. Its places lead to it if they are given as landmarks. They are found, so they are only roughly at
+ * the same features. */
 typedef struct orb_alternative {
-  double cost; /* how much its rough map bends the shapes, as a multiple of the best one's: at least 1 */
-  int32_t count;
-  orb_place at[2 * ORB_ALTERNATIVE_PAIRS]; /* count × 2 places, on the given meshes */
+  double cost;   /* how much its rough map bends the shapes, as a multiple of the best one's: at least 1 */
+  int32_t shape; /* the later shape that is matched otherwise */
+  int32_t count; /* at most ORB_ALTERNATIVE_PAIRS */
+  orb_place *at; /* count × shape_count places, on the given meshes */
 } orb_alternative;
 
 /* What the search without landmarks knows of its best rough map; with several later shapes, each
@@ -93,7 +95,7 @@ typedef struct orb_alignment {
   double energy;      /* symmetric Dirichlet energy of the composed maps, capped for each triangle and weighted by area;
                          lower is better; NaN if not measured */
   orb_match_facts match;
-  int32_t alternative_count; /* at most ORB_ALTERNATIVES_MAX, by rising cost; none unless there are two shapes */
+  int32_t alternative_count; /* at most ORB_ALTERNATIVES_MAX, by rising cost */
   orb_alternative *alternatives;
   int32_t suspect_count; /* at most ORB_SUSPECTS_MAX, by falling distance */
   orb_suspect *suspects;

@@ -2,7 +2,15 @@
  * Sends the merge request, follows its job, loads the asset and plays it. A morph is requested twice: with the fast
  * preset, whose result is shown at once, and as the options say, which replaces it.
  */
-import { CancelledError, ProblemError, type Job, type Supermesh, type SupermeshRequest } from 'orbmorph';
+import {
+  CancelledError,
+  ProblemError,
+  type Job,
+  type Landmark,
+  type Place,
+  type Supermesh,
+  type SupermeshRequest,
+} from 'orbmorph';
 import {
   client,
   givenLandmarks,
@@ -34,6 +42,7 @@ export function buildRequest(find = false): SupermeshRequest {
   if (options.maxTriangles) request.remesh.max_triangles = options.maxTriangles;
   request.asset = { fit: find ? 'none' : options.fit };
   if (options.path !== 'linear') request.asset.path = options.path;
+  if (options.holes !== 'reopen') request.asset.holes = options.holes;
   return request;
 }
 
@@ -62,10 +71,23 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
 /** Sends the next match of the shown morph, after the last one the first again. */
 export async function nextMatch() {
   const matches = state.result?.matches;
-  if (state.running || !matches) return;
-  const at = ((matches.tried ?? matches.at) + 1) % matches.requests.length;
+  if (matches) await sendMatch(matches, ((matches.tried ?? matches.at) + 1) % matches.requests.length);
+}
+
+/** The match that has left and right swapped, seen from the best one; −1 if there is none. */
+export const flippedOf = ({ told }: Matches) => (told?.others.findIndex(({ flips }) => flips) ?? -1) + 1 || -1;
+
+/** Sends the match that has left and right swapped, and from there the best one again. */
+export async function flipMatch() {
+  const matches = state.result?.matches;
+  const flipped = matches ? flippedOf(matches) : -1;
+  if (matches && flipped > 0) await sendMatch(matches, matches.at === flipped ? 0 : flipped);
+}
+
+async function sendMatch(matches: Matches, at: number) {
+  if (state.running) return;
   matches.tried = at; // one that fails is passed over next time
-  const next = { requests: matches.requests, at };
+  const next = { requests: matches.requests, at, told: matches.told };
   const running: Running = { purpose: 'morph', job: null, abort: new AbortController(), fast: null };
   set({ running, problem: null });
   const request = next.requests[next.at];
@@ -76,6 +98,41 @@ export async function nextMatch() {
     request,
     next,
   );
+}
+
+/** Whether the shapes of the page are those of a morph, in their order. */
+const isOfPage = ({ shapes }: Supermesh) =>
+  readyShapes().length === shapes.length && readyShapes().every((shape, i) => shape.mesh!.id === shapes[i].mesh);
+
+/** The landmarks that a morph found; of another match that was sent, those that led to it. */
+function foundIn({ landmarks = [], request }: Supermesh): { name?: string; at: Place[] }[] {
+  const found = landmarks.flatMap((l) => ('at' in l ? [{ name: l.name, at: l.at as Place[] }] : []));
+  if (found.length || !Array.isArray(request?.landmarks)) return found;
+  return request.landmarks.every(({ confidence }) => confidence < 1)
+    ? request.landmarks.map(({ at }) => ({ at: at as Place[] }))
+    : [];
+}
+
+/** Finds out what the alternatives of a match do otherwise. */
+async function tellOthers(result: Result) {
+  const { supermesh, matches } = result;
+  const { alternatives = [] } = supermesh;
+  if (!matches || matches.told || !alternatives.length || !isOfPage(supermesh)) return;
+  const found = foundIn(supermesh).map(({ name = '', at }) => ({ name, at }));
+  const others = await work(
+    'others',
+    readyShapes().map(({ key }) => key),
+    found,
+    alternatives.map(({ shape = 1, request }) => ({
+      shape,
+      places: (request.landmarks as Landmark[]).map((l) => l.at),
+    })),
+  );
+  matches.told = {
+    landmarks: found.map(({ name }) => name),
+    others: others.map((other, i) => ({ ...other, cost: alternatives[i].cost, shape: alternatives[i].shape ?? 1 })),
+  };
+  set();
 }
 
 /** The requests of a morph that was matched without landmarks, and of its alternatives. */
@@ -234,10 +291,8 @@ export async function openResult(
     });
     set({ result, mix: null });
     player.load(result);
-    if (!isFast(result) && readyShapes().every((shape, i) => shape.mesh!.id === supermesh.shapes[i]?.mesh)) {
-      const found = (supermesh.landmarks ?? []).flatMap((l) => ('at' in l ? [{ name: l.name, at: l.at }] : []));
-      void listFound(found, () => state.result === result);
-    }
+    void tellOthers(result);
+    if (!isFast(result) && isOfPage(supermesh)) void listFound(foundIn(supermesh), () => state.result === result);
     if (!keep) return;
     set({ show, side });
     player.seek(time);
@@ -252,7 +307,7 @@ export function clearResult() {
   const { result } = state;
   if (!result) return;
   player.unload();
-  for (const model of [result.main, ...result.each]) model.dispose();
+  for (const model of [result.main, ...result.each, ...(result.stretch ?? [])]) model.dispose();
   for (const shape of state.shapes) {
     shape.error?.model.dispose();
     shape.error = undefined;
@@ -288,4 +343,23 @@ export async function measureErrors() {
     }
     set({ loading: null });
   }
+}
+
+/** From here on a map is bad: reports warn of more than 1 % of the area at such an energy. */
+export const STRETCHED = 20;
+
+/** Measures how much the morph stretches its surface, and paints it on each shape. */
+export async function measureStretch() {
+  const { result } = state;
+  if (!result || result.stretch) return;
+  const values = await work('stretch', result.supermesh.id);
+  if (state.result !== result || result.stretch) return;
+  result.stretch = values.map((list, i) => {
+    const model = result.each[i].copy();
+    model.weights(result.data.shapes[i] ?? []);
+    model.attribute('value', list);
+    model.paint({ kind: 'value', ramp: 'heat', low: 1, high: STRETCHED, log: true });
+    return model;
+  });
+  set();
 }

@@ -108,6 +108,10 @@ export function triangleDistortion(x: Float64Array, image: Float64Array, corners
   return out;
 }
 
+/** The symmetric Dirichlet energy at each vertex of the map that takes x to image. */
+export const vertexDirichlet = (x: Float64Array, image: Float64Array, corners: Uint32Array) =>
+  vertexDistortion(x, image, corners).symmetric_dirichlet;
+
 function vertexDistortion(
   x: Float64Array,
   image: Float64Array,

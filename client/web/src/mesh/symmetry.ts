@@ -27,6 +27,15 @@ export const mirrored = ({ normal, offset }: Plane, p: number[]): number[] => {
   return p.map((x, k) => x - away * normal[k]);
 };
 
+/** A limb is farther from the plane than the middle of a body: as a fraction of half the diagonal. */
+const OFF = 0.06;
+
+/** The side of the plane on which a point lies: −1, 1, or 0 near the plane. */
+export function sideOfPlane({ normal, offset }: Plane, p: number[], radius: number): number {
+  const far = dot(normal, p) - offset;
+  return Math.abs(far) < OFF * radius ? 0 : Math.sign(far);
+}
+
 /** Eigenvectors of a symmetric matrix by Jacobi rotations, with their values, ascending. */
 function eigen(a: Matrix): { value: number; vector: number[] }[] {
   const m = a.map((row) => [...row]);

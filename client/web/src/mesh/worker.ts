@@ -10,7 +10,9 @@ import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } f
 import { decodeImages } from './dress';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
-import { mirrored, symmetryOf, type Plane } from './symmetry';
+import { stretchOf, touched, type Touched } from './linked';
+import { otherOf, sideOf, type Other } from './others';
+import { mirrored, sideOfPlane, symmetryOf, type Plane } from './symmetry';
 import type { Place } from 'orbmorph';
 
 interface Held {
@@ -65,6 +67,13 @@ function pointOf({ positions: p, corners }: RawMesh, t: number, w: [number, numb
   const out: [number, number, number] = [0, 0, 0];
   for (let c = 0; c < 3; c++) for (let k = 0; k < 3; k++) out[k] += w[c] * p[3 * corners[3 * t + c] + k];
   return out;
+}
+
+/** A place in the coordinates of the file. */
+function placeOn({ raw }: Held, place: Place): number[] {
+  if ('point' in place) return place.point;
+  if ('vertex' in place) return [0, 1, 2].map((k) => raw.positions[3 * place.vertex + k]);
+  return pointOf(raw, place.triangle, place.barycentric);
 }
 
 /** The nearest corner if it is near (within 1 % of the diagonal), otherwise the point itself. */
@@ -245,6 +254,49 @@ const ops = {
     });
     await decodeImages(data.skin);
     return data;
+  },
+
+  /** Where a ray meets a morph with the weights `seen`, and where that place is with other weights. */
+  touch(
+    key: string,
+    seen: ArrayLike<number>,
+    ray: { origin: number[]; direction: number[] },
+    others: ArrayLike<number>[],
+  ): Touched[] | null {
+    const morph = morphs.get(key);
+    return morph ? touched(morph, seen, ray, others) : null;
+  },
+
+  /** How much a morph stretches its surface at each drawn vertex, for each shape. */
+  stretch(key: string): Float32Array[] {
+    const morph = morphs.get(key);
+    return morph ? stretchOf(morph) : [];
+  },
+
+  /**
+   * What other matches do otherwise than the shown one. found: its landmarks, with their places on all shapes; others:
+   * which shape each of the other matches takes otherwise, and its places.
+   */
+  others(
+    keys: string[],
+    found: { name: string; at: Place[] }[],
+    others: { shape: number; places: Place[][] }[],
+  ): Other[] {
+    const meshes = keys.map((key) => held.get(key));
+    const points = (at: Place[], shape: number) =>
+      [0, shape].map((s) => (meshes[s] && at[s] ? placeOn(meshes[s]!, at[s]) : [Infinity, 0, 0]));
+    const plane = meshes[0] && planeOf(meshes[0]);
+    const sides = found.map(({ name, at }) =>
+      plane ? sideOfPlane(plane, points(at, 0)[0], meshes[0]!.frame.radius) : sideOf(name),
+    );
+    return others.map(({ shape, places }) =>
+      otherOf(
+        found.map(({ at }) => points(at, shape)),
+        places.map((at) => points(at, shape)),
+        sides,
+        [0, shape].map((s) => 2 * (meshes[s]?.frame.radius ?? 1)),
+      ),
+    );
   },
 
   /** For each proposed landmark a point on every shape, in the shape's file coordinates. The asset has `fit` none. */

@@ -1,12 +1,14 @@
 /** The Morph tab: playing, scrubbing and mixing; the common mesh on each shape; the error; downloads. */
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 import { isFast, isWaiting, presetOf, set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
 import { explain } from '../actions/token';
-import { measureErrors, nextMatch } from '../actions/merge';
+import { measureErrors, measureStretch, STRETCHED } from '../actions/merge';
 import { player } from '../player';
 import { client } from '../state';
-import { type RAMPS, rampCss } from '../view/colors';
+import { Beside } from './beside';
+import { Legend, Name } from './labels';
+import { Match, Suspects, Turned, Warnings } from './match';
 import { Button, count, Icon, relative, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';
@@ -35,6 +37,18 @@ export function MorphStage() {
               wire={state.meshWire}
             >
               <Name index={i} name={shape.name} note={`${count(result.supermesh.triangles)} triangles`} />
+            </Pane>
+          ))}
+        {show === 'stretch' &&
+          result.supermesh.shapes.map((shape, i) => (
+            <Pane key={`stretch${i}`} label={`Stretch on ${shape.name}`} model={result.stretch?.[i]} wire={state.wire}>
+              <Name index={i} name={shape.name} note={result.stretch ? stretchedMost(result, i) : 'measuring…'} />
+              <Legend
+                ramp="heat"
+                low="1: as it was"
+                high={`${STRETCHED}: bad`}
+                label="how much the morph stretches it"
+              />
             </Pane>
           ))}
         {show === 'error' &&
@@ -68,71 +82,11 @@ export function MorphStage() {
   );
 }
 
-/** The morph between the two shapes that it blends now, in one frame and under one camera. */
-function Beside({ result }: { result: Result }) {
-  const { shapes } = result.supermesh;
-  const [leg, setLeg] = useState(0);
-  useEffect(
-    () => player.listen((time) => setLeg(Math.min(Math.floor(time * (shapes.length - 1)), shapes.length - 2))),
-    [result],
-  );
-  const from = Math.min(leg, shapes.length - 2); // another morph may have fewer shapes
-  const side = (i: number) => (
-    <Pane key={`side${i}`} label={shapes[i].name} model={result.each[i]} wire={state.wire}>
-      <Name index={i} name={shapes[i].name} note="" />
-    </Pane>
-  );
-  return (
-    <div class="grid" data-count={3}>
-      {side(from)}
-      <Pane key="main" label="Morph" model={result.main} wire={state.wire}>
-        <div class="caption">
-          <strong>Morph</strong>
-        </div>
-      </Pane>
-      {side(from + 1)}
-    </div>
-  );
-}
-
 function NoMorph() {
   return (
     <div class="blank big">
       <p>No morph yet. Add two shapes and press “Morph”.</p>
       <Button onClick={() => set({ tab: 'shapes' })}>Go to the shapes</Button>
-    </div>
-  );
-}
-
-function Name({ index, name, note }: { index: number; name: string; note: string }) {
-  return (
-    <div class="caption">
-      <span class="dot" style={{ background: tint(index) }} aria-hidden="true" />
-      <strong>{name}</strong>
-      <span class="muted">{note}</span>
-    </div>
-  );
-}
-
-export function Legend({
-  ramp,
-  low,
-  high,
-  label,
-}: {
-  ramp: keyof typeof RAMPS;
-  low: string;
-  high: string;
-  label: string;
-}) {
-  return (
-    <div class="legend">
-      <span class="ramp" style={{ background: rampCss(ramp) }} aria-hidden="true" />
-      <span class="row spread">
-        <span>{low}</span>
-        <span>{high}</span>
-      </span>
-      <span class="muted">{label}</span>
     </div>
   );
 }
@@ -223,93 +177,6 @@ function wereGiven({ supermesh }: Result) {
   return Array.isArray(given) && given.every((landmark) => landmark.confidence === 1);
 }
 
-/** How sure the match of the shapes is, and a way to the next one. */
-function Match({ result }: { result: Result }) {
-  const { matches, supermesh } = result;
-  const verdict = supermesh.match?.verdict;
-  const said =
-    verdict === 'unsure'
-      ? 'Not sure: the shapes may be matched wrongly. Look at it, try the next match, or set landmarks.'
-      : verdict === 'likely'
-        ? 'The match looks plausible, but check it before you rely on it.'
-        : matches && matches.at > 0
-          ? `Match ${matches.at + 1} of ${matches.requests.length}; the first one was the best.`
-          : '';
-  if (!said && !matches) return null;
-  return (
-    <div class="match">
-      {said && (
-        <p class="hint" role="status" aria-label="How sure the match is">
-          {said}
-        </p>
-      )}
-      {matches && (
-        <Button disabled={!!state.running} onClick={() => void nextMatch()}>
-          Next match
-        </Button>
-      )}
-    </div>
-  );
-}
-
-/** Landmarks that may be misplaced. */
-function Suspects({ result: { supermesh } }: { result: Result }) {
-  const { shapes, suspects = [] } = supermesh;
-  if (!suspects.length) return null;
-  return (
-    <ul class="hint" aria-label="Landmarks that may be misplaced">
-      {suspects.map(({ landmark, name, shape, share, distance_relative: far }) => (
-        <li key={`${shape} ${landmark}`}>
-          {`${name || `Landmark ${landmark + 1}`} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
-            shapes[shape].name
-          } it would lie ${Math.round(100 * far)} % of the diagonal away.`}
-        </li>
-      ))}
-    </ul>
-  );
-}
-
-/** Beyond this a fit turned a shape over: degrees of its up axis. */
-const OVER = 60;
-
-/** What the fit did to shapes that it turned over. */
-function Turned({ result: { supermesh } }: { result: Result }) {
-  const over = supermesh.shapes.filter(({ fit }) => (fit?.up_degrees ?? 0) > OVER);
-  if (!over.length) return null;
-  return (
-    <ul class="hint" aria-label="Shapes that the fit turned over">
-      {over.map(({ name, fit }) => (
-        <li key={name}>
-          {`The fit turned ${name} over: its up axis by ${Math.round(fit!.up_degrees)}°. If that is wrong, set landmarks, or choose another fit under Options.`}
-        </li>
-      ))}
-    </ul>
-  );
-}
-
-/** The share of the surface that may get thin halfway: a patch or two are hardly seen. */
-const THIN_MOST = 0.01;
-
-/** Where the map between two shapes is bad. */
-function Warnings({ result: { supermesh } }: { result: Result }) {
-  const { shapes } = supermesh;
-  const warnings = (supermesh.warnings ?? []).filter(({ kind, share }) => kind !== 'thin' || share > THIN_MOST);
-  if (!warnings.length) return null;
-  const place = ({ shape, centre, radius }: (typeof warnings)[0]['parts'][0]['at'][0]) =>
-    `around (${centre.map((x) => Number(x.toPrecision(3))).join(', ')}) of ${shapes[shape].name}, within ${Number(radius.toPrecision(2))}`;
-  return (
-    <ul class="hint" aria-label="Warnings of the map">
-      {warnings.map(({ kind, a, b, share, parts }) => (
-        <li key={`${kind}${a}${b}`}>
-          {`From ${shapes[a].name} to ${shapes[b].name}, ${Number((100 * share).toPrecision(2))} % of the surface ${
-            kind === 'thin' ? 'gets thin halfway, as if a limb were twisted' : 'is stretched badly'
-          }: look ${place(parts[0].at[0])}. A landmark there may help.`}
-        </li>
-      ))}
-    </ul>
-  );
-}
-
 function Download({ result }: { result: Result }) {
   const { supermesh } = result;
   if (isWaiting())
@@ -368,14 +235,20 @@ export function MorphInspector() {
           { value: 'morph', label: 'Morph' },
           { value: 'beside', label: 'Side by side' },
           { value: 'each', label: 'Each shape' },
-          { value: 'error', label: 'Error' },
+          { value: 'stretch', label: 'Stretch', hint: 'A heat map of how much the morph stretches the surface' },
+          { value: 'error', label: 'Error', hint: 'How far the common mesh is from each shape' },
         ]}
       />
+      {state.show === 'beside' && (
+        <p class="hint">Point at a place, or press Enter in a view: it is marked on all of them.</p>
+      )}
+      {state.show === 'stretch' && <StretchLoader />}
       {state.show === 'error' && <ErrorLoader />}
       {(state.show === 'morph' || state.show === 'beside') && <Mix result={result} />}
       <div class="row wrap gap-top">
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>
+      <Dropped entries={supermesh.dropped} />
       <div class="row wrap gap-top">
         <Download result={result} />
         <Button icon="code" disabled={isWaiting()} onClick={() => set({ drawer: 'share' })}>
@@ -440,7 +313,6 @@ export function MorphInspector() {
           ))}
         </tbody>
       </table>
-      <Dropped entries={supermesh.dropped} />
       <OptionsFold />
     </>
   );
@@ -470,6 +342,23 @@ function Dropped({ entries }: { entries: Result['supermesh']['dropped'] }) {
 function ErrorLoader() {
   useEffect(() => void measureErrors(), [state.result]);
   return <p class="hint">Distance of each shape from the common mesh, measured in this browser.</p>;
+}
+
+/** By the report: what 99 % of a shape's surface stay below; of the first shape, on the way to any other one. */
+function stretchedMost({ supermesh: { pairs = [] } }: Result, shape: number): string {
+  const of = pairs.filter(({ a, b }) => a === 0 && (shape === 0 || b === shape));
+  const most = Math.max(...of.map(({ distortion }) => distortion.symmetric_dirichlet.p99 ?? Infinity));
+  return Number.isFinite(most) ? `99 % of it below ${Number(most.toPrecision(2))}` : '';
+}
+
+function StretchLoader() {
+  useEffect(() => void measureStretch(), [state.result]);
+  return (
+    <p class="hint">
+      The map is least to be trusted where it stretches most: the symmetric Dirichlet energy between the first shape and
+      each other one, from 1 to bad.
+    </p>
+  );
 }
 
 function Mix({ result }: { result: Result }) {

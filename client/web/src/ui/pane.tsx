@@ -2,6 +2,7 @@
 import type { ComponentChildren } from 'preact';
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { work } from '../mesh/work';
+import type { Touched } from '../mesh/linked';
 import type { Spot } from '../mesh/worker';
 import { Loupe } from '../view/loupe';
 import { stage } from '../view/shared';
@@ -17,12 +18,14 @@ interface PaneProps {
   wire?: boolean;
   pickable?: Shape;
   markers?: Shape;
+  /** a point that the views have in common: where it is here, and what becomes of a place under the pointer */
+  probe?: { spot: Touched | null; at: (ray: Ray | null) => void };
   /** a sphere whose landmarks the view shows */
   spots?: SphereState;
   children?: ComponentChildren;
 }
 
-export function Pane({ label, model, wire = false, pickable, markers, spots, children }: PaneProps) {
+export function Pane({ label, model, wire = false, pickable, markers, spots, probe, children }: PaneProps) {
   const element = useRef<HTMLDivElement>(null);
   const view = useRef<View | null>(null);
 
@@ -34,7 +37,8 @@ export function Pane({ label, model, wire = false, pickable, markers, spots, chi
   useLayoutEffect(() => {
     model?.wireframe(wire, isDark() ? '#05070a' : '#20242c');
     view.current!.show(model ?? null);
-    view.current!.onPick = pickable ? (ray) => void pickOn(pickable, ray.origin, ray.direction) : null;
+    view.current!.onPick = pickable ? (ray) => void pickOn(pickable, ray.origin, ray.direction) : (probe?.at ?? null);
+    view.current!.onHover = probe?.at ?? null;
     stage.draw();
   });
 
@@ -46,9 +50,10 @@ export function Pane({ label, model, wire = false, pickable, markers, spots, chi
         tabIndex={0}
         role="application"
         aria-roledescription="3D view"
-        aria-label={`${label}. Arrow keys rotate, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark at the centre' : ''}.`}
+        aria-label={`${label}. Arrow keys rotate, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark at the centre' : probe ? ', Enter marks the place at the centre in all views' : ''}.`}
       >
         {markers && <Markers shape={markers} view={view} />}
+        {probe?.spot && <Probe spot={probe.spot} view={view} />}
         {spots?.spots && spots.spots.size > 0 && <Spots spots={spots.spots} view={view} />}
       </div>
       {children}
@@ -208,6 +213,23 @@ function Spots({ spots, view }: { spots: Map<number, [number, number, number]>; 
           {index + 1}
         </span>
       ))}
+    </div>
+  );
+}
+
+/** A point that the views have in common. */
+function Probe({ spot, view }: { spot: Touched; view: { current: View | null } }) {
+  const dot = useRef<HTMLSpanElement>(null);
+  useEffect(() => {
+    view.current!.markers = [{ ...spot, element: dot.current! }];
+    stage.draw();
+    return () => {
+      if (view.current) view.current.markers = [];
+    };
+  }, [spot]);
+  return (
+    <div class="markers" aria-hidden="true">
+      <span ref={dot} class="marker probe" />
     </div>
   );
 }

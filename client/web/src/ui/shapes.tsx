@@ -1,5 +1,5 @@
 /** Shapes: the views side by side, the list with uploads and refusals, the options. */
-import { set, state, tint, type Options, type Shape } from '../state';
+import { DEFAULTS, set, state, tint, type Options, type Shape } from '../state';
 import { addSamples, uploadAgain, moveShape, repairsFor, removeShape, sampleList } from '../actions/shapes';
 import { stage } from '../view/shared';
 import { Bar, Button, count, Field, Icon, Segments, Switch } from './parts';
@@ -71,8 +71,38 @@ export function ShapesInspector() {
         />
         <Switch label="Wireframe" on={state.wire} onChange={(wire) => set({ wire })} />
       </div>
+      <OwnMesh />
       <OptionsFold />
     </>
+  );
+}
+
+/** Whether the first mesh stays as it came, and with its holes. */
+function OwnMesh() {
+  const [first] = state.shapes;
+  if (!first?.mesh) return null;
+  const keeps = state.options.remesh === 'template';
+  const filled = first.mesh.repairs?.some(({ kind, count }) => kind === 'fill_holes' && count > 0);
+  return (
+    <div class="own">
+      <Switch
+        label={`Keep the mesh of ${first.name}`}
+        on={keeps}
+        onChange={(on) => change({ remesh: on ? 'template' : DEFAULTS.remesh })}
+      />
+      <p class="hint">
+        {keeps
+          ? `Its vertices, triangles, texture coordinates, skin, materials and holes stay as they are. The other shapes become its morph targets.`
+          : 'Off: the morph has a new mesh that fits all shapes.'}
+      </p>
+      {filled && !keeps && (
+        <Switch
+          label={`Open the holes of ${first.name} again in the morph`}
+          on={state.options.holes === 'reopen'}
+          onChange={(on) => change({ holes: on ? 'reopen' : 'filled' })}
+        />
+      )}
+    </div>
   );
 }
 
@@ -135,10 +165,13 @@ function ShapeCard({ shape, index }: { shape: Shape; index: number }) {
   );
 }
 
+const HANDLES_SHOWN = 5;
+
 function Refusal({ shape }: { shape: Shape }) {
   const problem = shape.problem!;
   const loops = problem.boundary_loops as number | undefined;
   const pieces = problem.components as unknown[] | undefined;
+  const handles = (problem.loop_lengths_relative as number[] | undefined) ?? [];
   return (
     <div class="notice error" role="alert">
       <Icon name="alert" />
@@ -153,6 +186,16 @@ function Refusal({ shape }: { shape: Shape }) {
           {problem.offset !== undefined && `Byte ${String(problem.offset)}. `}
           {!!shape.defects && shape.model && <span class="red">Shown in red on the model.</span>}
         </p>
+        {handles.length > 0 && (
+          <ul class="facts" aria-label="Handles">
+            {handles.slice(0, HANDLES_SHOWN).map((length, i) => (
+              <li key={i}>
+                Handle {i + 1}: its loop is {Number((100 * length).toPrecision(2))} % of the diagonal long.
+              </li>
+            ))}
+            {handles.length > HANDLES_SHOWN && <li>{handles.length - HANDLES_SHOWN} more</li>}
+          </ul>
+        )}
         <div class="row wrap">
           {repairsFor(problem).map((option) => (
             <Button key={option.repair} onClick={() => uploadAgain(shape.key, option.repair)}>

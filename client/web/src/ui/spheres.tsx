@@ -5,7 +5,7 @@ import { PAINTS, readyShapes, state, tint, type Shape, type SpherePaint } from '
 import { canAlign, isMeasure, loadSpheres, measureRange, setPaint, showSide, sphereOf } from '../actions/spheres';
 import { Bar, Segments } from './parts';
 import { Pane } from './pane';
-import { Legend } from './morph';
+import { Legend } from './labels';
 
 const NAMES: Record<SpherePaint, string> = {
   direction: 'Normals',

@@ -23,6 +23,8 @@ export class View {
   content: Model | null = null;
   markers: Marker[] = [];
   onPick: ((ray: Ray) => void) | null = null;
+  /** the place under the mouse; null once it leaves the view */
+  onHover: ((ray: Ray | null) => void) | null = null;
   own = new Orbit();
   /** a camera of its own, which no one rotates */
   fixed: Look | null = null;
@@ -169,6 +171,7 @@ function listen(view: View, stage: Stage) {
   const { element } = view;
   const fingers = new Map<number, { x: number; y: number }>();
   let start: { x: number; y: number; moved: boolean } | null = null;
+  let over = { x: NaN, y: NaN };
 
   element.addEventListener('pointerdown', (event) => {
     if ((event.target as HTMLElement).closest('button, input, a, select')) return;
@@ -178,6 +181,10 @@ function listen(view: View, stage: Stage) {
   });
   element.addEventListener('pointermove', (event) => {
     const finger = fingers.get(event.pointerId);
+    if (!finger && event.pointerType === 'mouse' && (event.clientX !== over.x || event.clientY !== over.y)) {
+      over = { x: event.clientX, y: event.clientY }; // browsers also send the event where only the page has moved
+      view.onHover?.(view.rayAt(over.x, over.y));
+    }
     if (!finger) return;
     const dx = event.clientX - finger.x;
     const dy = event.clientY - finger.y;
@@ -204,6 +211,11 @@ function listen(view: View, stage: Stage) {
       view.onPick?.(view.rayAt(event.clientX, event.clientY));
     start = null;
   };
+  element.addEventListener('pointerleave', (event) => {
+    if (event.pointerType !== 'mouse' || fingers.size) return;
+    over = { x: NaN, y: NaN };
+    view.onHover?.(null);
+  });
   element.addEventListener('pointerup', end);
   element.addEventListener('pointercancel', end);
   element.addEventListener('contextmenu', (event) => event.preventDefault());

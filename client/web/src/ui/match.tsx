@@ -1,0 +1,144 @@
+/** What the answer says about the map: how sure the match is, and where the map may be wrong. */
+import { set, state, type Result } from '../state';
+import { flipMatch, flippedOf, nextMatch } from '../actions/merge';
+import { sideOf } from '../mesh/others';
+import { player } from '../player';
+import { Button } from './parts';
+
+/** Another match lowers the confidence if it bends the shapes less than twice as much. Others are not worth a word. */
+const CREDIBLE = 2;
+
+const isWord = (name: string) => !!name && !/^(auto|pair) \d+$/.test(name);
+
+/** What may be otherwise, in words, by the best other match that has any: "the tail of dog may be the … of giraffe". */
+function doubtOf({ matches, supermesh: { shapes } }: Result): string | null {
+  if (!matches?.told || matches.at > 0) return null;
+  const { landmarks, others } = matches.told;
+  for (const { cost, shape, swaps, flips } of others) {
+    if (cost > CREDIBLE) continue;
+    const clear = swaps.find(({ from, to }) => {
+      const [a, b] = [landmarks[from], landmarks[to]];
+      return isWord(a) && isWord(b) && (!flips || sideOf(a) * sideOf(b) < 0);
+    });
+    const words =
+      clear &&
+      `the ${landmarks[clear.from]} of ${shapes[0].name} may be the ${landmarks[clear.to]} of ${shapes[shape].name}`;
+    if (flips) return `left and right may be swapped${words ? `: ${words}` : ''}`;
+    if (words) return words;
+  }
+  return null;
+}
+
+function sentenceOf(result: Result): string {
+  const { matches, supermesh } = result;
+  const verdict = supermesh.match?.verdict;
+  const doubt = doubtOf(result);
+  if (verdict === 'unsure')
+    return `Not sure: ${doubt ?? 'the shapes may be matched wrongly'}. Look at it, try the next match, or set landmarks.`;
+  if (verdict === 'likely')
+    return `The match looks plausible, but ${doubt ? `${doubt}. Check` : 'check'} it before you rely on it.`;
+  return matches && matches.at > 0
+    ? `Match ${matches.at + 1} of ${matches.requests.length}; the first one was the best.`
+    : '';
+}
+
+/** How sure the match of the shapes is, and ways to look at it and to the next ones. */
+export function Match({ result }: { result: Result }) {
+  const { matches, supermesh } = result;
+  const said = sentenceOf(result);
+  if (!said && !matches) return null;
+  return (
+    <div class="match">
+      {said && (
+        <p class="hint" role="status" aria-label="How sure the match is">
+          {said}
+        </p>
+      )}
+      <div class="row wrap">
+        {matches && (
+          <Button disabled={!!state.running} onClick={() => void nextMatch()}>
+            Next match
+          </Button>
+        )}
+        {matches && flippedOf(matches) > 0 && (
+          <Button
+            disabled={!!state.running}
+            title="The match that has left and right swapped, and back"
+            onClick={() => void flipMatch()}
+          >
+            Flip
+          </Button>
+        )}
+        {supermesh.match && supermesh.match.verdict !== 'sure' && state.show !== 'stretch' && (
+          <Button
+            title="Where the morph stretches the surface, and the map is least to be trusted"
+            onClick={() => {
+              player.pause();
+              set({ show: 'stretch' });
+            }}
+          >
+            Heat map
+          </Button>
+        )}
+      </div>
+    </div>
+  );
+}
+
+/** Landmarks that may be misplaced. */
+export function Suspects({ result: { supermesh } }: { result: Result }) {
+  const { shapes, suspects = [] } = supermesh;
+  if (!suspects.length) return null;
+  return (
+    <ul class="hint" aria-label="Landmarks that may be misplaced">
+      {suspects.map(({ landmark, name, shape, share, distance_relative: far }) => (
+        <li key={`${shape} ${landmark}`}>
+          {`${name || `Landmark ${landmark + 1}`} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
+            shapes[shape].name
+          } it would lie ${Math.round(100 * far)} % of the diagonal away.`}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+/** Beyond this a fit turned a shape over: degrees of its up axis. */
+const OVER = 60;
+
+/** What the fit did to shapes that it turned over. */
+export function Turned({ result: { supermesh } }: { result: Result }) {
+  const over = supermesh.shapes.filter(({ fit }) => (fit?.up_degrees ?? 0) > OVER);
+  if (!over.length) return null;
+  return (
+    <ul class="hint" aria-label="Shapes that the fit turned over">
+      {over.map(({ name, fit }) => (
+        <li key={name}>
+          {`The fit turned ${name} over: its up axis by ${Math.round(fit!.up_degrees)}°. If that is wrong, set landmarks, or choose another fit under Options.`}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+/** The share of the surface that may get thin halfway: a patch or two are hardly seen. */
+const THIN_MOST = 0.01;
+
+/** Where the map between two shapes is bad. */
+export function Warnings({ result: { supermesh } }: { result: Result }) {
+  const { shapes } = supermesh;
+  const warnings = (supermesh.warnings ?? []).filter(({ kind, share }) => kind !== 'thin' || share > THIN_MOST);
+  if (!warnings.length) return null;
+  const place = ({ shape, centre, radius }: (typeof warnings)[0]['parts'][0]['at'][0]) =>
+    `around (${centre.map((x) => Number(x.toPrecision(3))).join(', ')}) of ${shapes[shape].name}, within ${Number(radius.toPrecision(2))}`;
+  return (
+    <ul class="hint" aria-label="Warnings of the map">
+      {warnings.map(({ kind, a, b, share, parts }) => (
+        <li key={`${kind}${a}${b}`}>
+          {`From ${shapes[a].name} to ${shapes[b].name}, ${Number((100 * share).toPrecision(2))} % of the surface ${
+            kind === 'thin' ? 'gets thin halfway, as if a limb were twisted' : 'is stretched badly'
+          }: look ${place(parts[0].at[0])}. A landmark there may help.`}
+        </li>
+      ))}
+    </ul>
+  );
+}
