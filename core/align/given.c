@@ -168,9 +168,10 @@ end:
 
 /* Composes the map to shape s towards a match that agrees with the landmarks, without them, and then with them pinned.
  * *energy: INFINITY if there is no such match, or no such map. */
-static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double *energy) {
+static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double stretch,
+                                double *energy) {
   orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
-  const orb_match_hint hint = {a->landmark_count, fixed->landmark_vertices, moving->landmark_vertices};
+  const orb_match_hint hint = {a->landmark_count, fixed->landmark_vertices, moving->landmark_vertices, stretch};
   const orb_map_guide near = {.from = ORB_MAP_FROM_NEAR};
   orb_match match;
   double energies[2];
@@ -193,7 +194,7 @@ done:
  * what lies between. *found 0: the landmarks do not say so, or there is no map, and `out` is empty. */
 static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                               const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                              orb_alignment *out, int *found) {
+                              double stretch, orb_alignment *out, int *found) {
   orb_align_options rotated = *options;
   double sum = 0;
   rotated.method = ORB_ALIGN_ROTATE;
@@ -202,7 +203,7 @@ static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, i
   orb_status status = ORB_OK;
   for (int32_t s = 1; s < shape_count && sum < INFINITY && status == ORB_OK; s++) {
     double energy;
-    status = compose_posed(ctx, out, s, options->preset, &energy);
+    status = compose_posed(ctx, out, s, options->preset, stretch, &energy);
     sum += energy;
   }
   *found = status == ORB_OK && sum < INFINITY;
@@ -218,6 +219,7 @@ static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, i
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                           const orb_align_options *options, orb_alignment *a) {
   const double good = orb_map_params_of(options->preset).energy.good;
+  const double poor = orb_map_params_of(options->preset).energy.poor;
   double energy = INFINITY;
   int walked = 0, posed = 0;
   if (a->shape_count == 2) {
@@ -229,7 +231,8 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const
   }
   if (energy > good && a->landmark_count >= ORB_FIND_HINT_LEAST) {
     orb_alignment other;
-    ORB_TRY(align_posed(ctx, shapes, a->shape_count, landmarks, a->landmark_count, options, &other, &posed));
+    ORB_TRY(align_posed(ctx, shapes, a->shape_count, landmarks, a->landmark_count, options,
+                        energy > poor ? ORB_FIND_HINT_STRETCH_MOST : ORB_FIND_HINT_STRETCH, &other, &posed));
     if (posed && other.energy < energy) {
       orb_alignment_free(ctx, a);
       *a = other;

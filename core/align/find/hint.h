@@ -9,6 +9,7 @@
 typedef struct orb_match_hint {
   int32_t count;
   const int32_t *first, *second;
+  double stretch; /* orb_hint_stretch() up to which the shapes are one in two poses */
 } orb_match_hint;
 
 /* The hint on scaled coarse copies of the shapes. */

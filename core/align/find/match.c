@@ -395,7 +395,7 @@ static orb_status take_hint(search *t, const orb_match_hint *hint, int *agrees) 
   }
   ORB_TRY(orb_hint_places_create(t->ctx, count, at, t->copy, &t->hint));
   ORB_TRY(orb_hint_stretch(t->ctx, &t->hint, t->copy, &stretch));
-  *agrees = stretch <= ORB_FIND_HINT_STRETCH;
+  *agrees = stretch <= hint->stretch;
   return ORB_OK;
 }
 

@@ -279,14 +279,17 @@ static orb_status let_go(orb_map_run *c) {
 }
 
 static orb_status snap(orb_map_run *c) {
+  const int left = 1 + (int)fmin(c->params.shift.most - 1, orb_map_longest_way(c) / c->params.shift.step);
   c->pairs.count = c->pairs.landmarks;
-  c->best_energy = INFINITY;
-  c->params.work.rough = 0;
-  ORB_TRY(orb_map_shift(c));
   ORB_TRY(orb_map_levels_prepare(c));
-  ORB_TRY(orb_map_run_start(c, ORB_MAP_GIVEN));
-  if (c->best_energy == INFINITY) {
-    return ORB_OK;
+  for (int i = left; i > 0; i--) {
+    ORB_TRY(orb_map_shift(c, 1.0 / i));
+    c->best_energy = INFINITY;
+    c->params.work.rough = i > 1;
+    ORB_TRY(orb_map_run_start(c, ORB_MAP_GIVEN));
+    if (c->best_energy == INFINITY) {
+      return ORB_OK;
+    }
   }
   return c->best_energy > c->params.energy.good ? orb_map_run_passes(c, 1) : ORB_OK;
 }

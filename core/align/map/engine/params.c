@@ -71,7 +71,7 @@ static const orb_map_params DEFAULTS = {
                  .all_worst2 = 0.04,
                  .convexity = 0.05},
     .draw = {.rounds = 5, .sweeps = 40, .clearings = 8, .pull = 20, .fall = 0.8, .leap = 1.5},
-    .shift = {.reach = 3, .least = 0.1},
+    .shift = {.reach = 3, .least = 0.1, .step = 0.08, .most = 4},
     .near = {.few = 30,
              .rings = 12,
              .usable_rings = 4,

@@ -99,10 +99,10 @@ typedef struct orb_map_params {
                         left for them */
     double gain;     /* of the energy, relative: a loosening that gains less is idle */
     double
-        barriers[2];   /* of a loosening, and of the one after an idle one: a weak barrier frees more, and folds more */
-    double hopeless;   /* energy of the first level above which the walk has twisted limbs, and no finer level helps */
-    double twisted;    /* the same of the last level */
-    int work;          /* least that each guided walk has, as work.all */
+        barriers[2]; /* of a loosening, and of the one after an idle one: a weak barrier frees more, and folds more */
+    double hopeless; /* energy of the first level above which the walk has twisted limbs, and no finer level helps */
+    double twisted;  /* the same of the last level */
+    int work;        /* least that each guided walk has, as work.all */
     int32_t guides[ORB_MAP_GUIDED]; /* samples of the spatial targets that guide one walk each, spread over the moving
                         shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
                         walk get stuck, and which is best is close to chance */
@@ -186,6 +186,8 @@ typedef struct orb_map_params {
   struct {
     double reach; /* a landmark takes along what lies nearer than this many times its way, */
     double least; /* or than this */
+    double step;  /* of the longest way: the map is optimised after each, */
+    int most;     /* but after no more than this many */
   } shift;
 
   /* A start that is nearly a map. */

@@ -10,10 +10,10 @@
 
 enum { CHECK_EVERY = 1024 }; /* vertices between checks for cancellation; a power of two */
 
-/* Where the map as given takes a vertex. */
+/* Where the best map takes a vertex. */
 static void image_of(const orb_map_run *c, int32_t v, double y[3]) {
   orb_place place;
-  orb_locate(c->b.locator, c->moving->points + 3 * (size_t)v, -1, &place);
+  orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
   orb_map_surface_at(&c->b, &place, y, NULL, NULL);
 }
 
@@ -46,7 +46,17 @@ static int shift_of(const orb_map_run *c, int32_t v, const double *way, double o
   return sum > 0;
 }
 
-orb_status orb_map_shift(orb_map_run *c) {
+double orb_map_longest_way(const orb_map_run *c) {
+  double longest2 = 0;
+  for (int32_t i = 0; i < c->pairs.landmarks; i++) {
+    double y[3];
+    image_of(c, c->pairs.moving[i], y);
+    longest2 = fmax(longest2, orb_distance2(c->b.x + 3 * (size_t)c->pairs.fixed[i], y));
+  }
+  return sqrt(longest2);
+}
+
+orb_status orb_map_shift(orb_map_run *c, double share) {
   orb_nearest *tree = NULL;
   double *way = ORB_NEW(c->ctx, double, 3 * (size_t)c->pairs.landmarks);
   orb_status status = ORB_E_NO_MEMORY;
@@ -55,19 +65,22 @@ orb_status orb_map_shift(orb_map_run *c) {
   }
   ORB_GO(status, orb_nearest_create(c->ctx, c->b.x, c->b.triangles, c->b.triangle_count, &tree), done);
   measure_ways(c, way);
-  memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+  memcpy(c->start, c->best, 3 * (size_t)c->vertex_count * sizeof *c->start);
   for (int32_t v = 0; v < c->vertex_count && status == ORB_OK; v++) {
     double shift[3], y[3];
     if (shift_of(c, v, way, shift)) {
       orb_place place;
       image_of(c, v, y);
       for (int k = 0; k < 3; k++) {
-        y[k] += shift[k];
+        y[k] += share * shift[k];
       }
       orb_nearest_query(tree, y, INFINITY, &place);
       orb_map_surface_at(&c->b, &place, NULL, c->start + 3 * (size_t)v, NULL);
     }
     status = (v & (CHECK_EVERY - 1)) == CHECK_EVERY - 1 ? orb_context_check(c->ctx) : ORB_OK;
+  }
+  for (int32_t i = 0; i < c->pairs.landmarks && share == 1; i++) {
+    memcpy(c->start + 3 * (size_t)c->pairs.moving[i], c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
   }
 done:
   orb_nearest_destroy(c->ctx, tree);

@@ -4,8 +4,12 @@
 
 #include "align/map/engine/run.h"
 
-/* Sets run->start to the map as given, with the landmarks at their partners and their surroundings shifted along. Few
- * triangles flip where landmarks were near their partners. O(n · landmarks + n log n). */
-ORB_MUST_CHECK orb_status orb_map_shift(orb_map_run *run);
+/* Sets run->start to the best map, with the landmarks moved this share of the way to their partners (1: to their
+ * points, exactly), and their surroundings with them. Few triangles flip where the ways are short. O(n · landmarks +
+ * n log n). */
+ORB_MUST_CHECK orb_status orb_map_shift(orb_map_run *run, double share);
+/* The longest way of a landmark from where the best map takes it to its partner, in radii of a ball of the shape's
+ * area. */
+double orb_map_longest_way(const orb_map_run *run);
 
 #endif
