@@ -21,7 +21,7 @@ static const double SHORTEST = 0.1;
 static const double DELAUNAY = -1e-6;
 static const double COTANGENT = 20; /* of 2.9 degrees */
 
-enum { ROUNDS = 64, FLIP_PASSES = 16 };
+enum { ROUNDS = 64, FLIP_PASSES = 4 }; /* on a bent surface two edges may take turns: each pass flips fewer, if any */
 
 double orb_patch_cotangent(const double *a, const double *b, const double *c) {
   double u[3], w[3], n[3];
