@@ -108,3 +108,40 @@ test('vertices in their order, a vertex that a seam repeats, and one that no tri
   const off = farthest(on, target.positions.flat(), target.triangles.flat());
   assert.ok(off <= 1e-6 * diagonalOf(target.positions), `${off}`);
 });
+
+test('an OBJ vertex with several texture coordinates gets copies after all vertices, which move alike', async (t) => {
+  const d = await daemon(t);
+  const base = shapes.egg(2);
+  // The first chart has the texture coordinates 1 … n, one a vertex; the second, every third triangle, the next n.
+  const uv = [0, 1].flatMap((chart) =>
+    base.points.map(([x, y]) => [chart / 2 + (x + 1) / 4, (y + 1) / 2].map(Math.fround)),
+  );
+  const n = base.positions.length;
+  const chartOf = (i) => (i % 3 === 0 ? n : 0);
+  const text =
+    base.positions.map((p) => `v ${p.join(' ')}\n`).join('') +
+    uv.map((p) => `vt ${p.join(' ')}\n`).join('') +
+    base.triangles.map((f, i) => `f ${f.map((v) => `${v + 1}/${v + 1 + chartOf(i)}`).join(' ')}\n`).join('');
+  const first = (await d.upload(text, { name: 'egg' })).json;
+  const second = (await d.upload(shapes.obj(shapes.bean(2)), { name: 'bean' })).json;
+  const made = await d.made('/v1/supermeshes', {
+    shapes: [{ mesh: first.id }, { mesh: second.id }],
+    align: { method: 'rotate' },
+    remesh,
+    asset: { fit: 'none' },
+  });
+  const morph = morphOf((await d.get(made.asset)).bytes);
+  const read = morph.read(morph.gltf.meshes[0].primitives[0].attributes.TEXCOORD_0);
+  const charts = base.positions.map(() => new Set());
+  base.triangles.forEach((f, i) => f.forEach((v) => charts[v].add(chartOf(i))));
+  assert.equal(morph.count, n + charts.filter((some) => some.size === 2).length);
+  assert.deepEqual(morph.shapes[0].slice(0, 3 * n), base.positions.flat().map(Math.fround));
+  base.triangles.flat().forEach((v, i) => {
+    const at = morph.triangles[i];
+    assert.ok(at === v || at >= n);
+    for (const values of [morph.shapes[0], morph.deltas[0]])
+      assert.deepEqual(values.slice(3 * at, 3 * at + 3), values.slice(3 * v, 3 * v + 3));
+    const [a, b] = uv[v + chartOf(Math.floor(i / 3))];
+    assert.deepEqual([read[2 * at], read[2 * at + 1]], [a, Math.fround(1 - b)]);
+  });
+});
