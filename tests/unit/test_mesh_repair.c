@@ -13,6 +13,7 @@
 #include "numeric/vec3.h"
 #include "orbmorph/format.h"
 #include "support_context.h"
+#include "support_remesh.h"
 #include "support_shapes.h"
 
 static orb_status read_repaired(const char *text, unsigned repair, orb_mesh *mesh) {
@@ -236,8 +237,8 @@ static void test_fill(void **state) {
   }
 }
 
-/* The part of a ball whose vertices `keep` wants, filled. */
-static void cut_and_fill(int levels, int (*keep)(const double *), orb_mesh *mesh) {
+/* The part of a ball whose triangles `keep` wants, as OBJ; free() it. */
+static char *cut_ball(int levels, int (*keep)(const double *)) {
   orb_mesh ball = shape_ball(ctx, levels);
   char *text = malloc(80 * (size_t)(ball.vertex_count + ball.triangle_count)), *p = text;
   assert_non_null(text);
@@ -257,6 +258,11 @@ static void cut_and_fill(int levels, int (*keep)(const double *), orb_mesh *mesh
     }
   }
   shape_free(ctx, &ball);
+  return text;
+}
+
+static void cut_and_fill(int levels, int (*keep)(const double *), orb_mesh *mesh) {
+  char *text = cut_ball(levels, keep);
   assert_int_equal(read_repaired(text, ORB_REPAIR_FILL_HOLES, mesh), ORB_OK);
   assert_int_equal(shape_repaired(mesh, "fill_holes"), 1);
   free(text);
@@ -289,6 +295,30 @@ static void test_fair_fill(void **state) {
     }
     orb_mesh_free(ctx, &mesh);
   }
+}
+
+/* Every allocation fails once; the repair reports it and leaks nothing. */
+static void test_fair_fill_without_memory(void **state) {
+  (void)state;
+  char *text = cut_ball(5, beside_cap);
+  int failures = 0;
+  for (int64_t after = 0, done = 0; !done; after++) {
+    int64_t left = INT64_MAX;
+    orb_context *failing = remesh_failing_context(&left);
+    orb_mesh mesh;
+    assert_int_equal(orb_mesh_read(failing, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, &mesh, NULL),
+                     ORB_OK);
+    left = after;
+    orb_status status = orb_mesh_repair(failing, &mesh, ORB_REPAIR_FILL_HOLES);
+    done = status == ORB_OK;
+    assert_true(done || status == ORB_E_NO_MEMORY);
+    failures += !done;
+    left = INT64_MAX;
+    orb_mesh_free(failing, &mesh);
+    orb_context_destroy(failing); /* asserts that all was freed */
+  }
+  assert_true(failures > 50);
+  free(text);
 }
 
 /* A tube of length 1 whose ends have many edges: each gets a dome, between the flat cap and the half ball. The
@@ -353,6 +383,7 @@ int main(void) {
                                      cmocka_unit_test(test_fill),
                                      cmocka_unit_test(test_fair_fill),
                                      cmocka_unit_test(test_fair_fill_of_tube),
+                                     cmocka_unit_test(test_fair_fill_without_memory),
                                      cmocka_unit_test(test_concave_polygon),
                                      cmocka_unit_test(test_copy)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
