@@ -62,6 +62,13 @@ void api_pairs_write(const orb_merge_result *result, api_text *out) {
     api_json_key(out, "distortion");
     api_distortion_write(out, &result->pairs[i].distortion);
     api_json_member_number(out, "inverted_fraction", result->pairs[i].inverted_fraction);
+    api_json_member_integer(out, "inverted_count", result->pairs[i].inverted_count);
+    api_json_key(out, "inverted_triangles");
+    api_json_open(out, '[');
+    for (int32_t k = 0; k < result->pairs[i].inverted_listed; k++) {
+      api_json_integer(out, result->pairs[i].inverted_triangles[k]);
+    }
+    api_json_close(out, ']');
     api_json_close(out, '}');
   }
   api_json_close(out, ']');

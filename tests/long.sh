@@ -2,7 +2,8 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust deploy blender visit
+#   tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust templates deploy blender
+#   visit
 #
 # ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_TEST_PATIENCE how many
 # times longer than usual scenarios wait for what should come: 4 with tsan, 20 with valgrind.
@@ -188,6 +189,14 @@ part_robust() {
   fi
 }
 
+# Each good mesh as a template: its vertices, corners and attributes must stay.
+part_templates() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build
+  ORBMORPHD="$PWD/build/bin/orbmorphd" ORB_SHARED_MESHES=$(realpath "${ORB_MESHES:-../shared/meshes}") \
+    ORB_TEMPLATE_MOST=1000000 node --test tests/scenario/real_templates.test.mjs
+}
+
 # Behind nginx and Caddy, the unit's score, the dashboard's queries; as root also the package and the container.
 part_deploy() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
@@ -198,7 +207,8 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust deploy blender visit
+  set -- tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust templates deploy \
+    blender visit
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -15,7 +15,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "elastic/body.h"
-#include "elastic/factor.h"
+#include "numeric/factor.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 

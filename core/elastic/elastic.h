@@ -5,7 +5,6 @@
  * the right limbs bends little, and a wrong one bends much, whatever tips of limbs it is a little off by: so the cost
  * ranks maps. Read in this order:
  *
- *   factor.h   the matrix
  *   body.h     a mesh with what the steps read
  *   elastic.h  the registration
  *

@@ -36,7 +36,8 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
 }
 
 static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
-                                   orb_merge_result *out) {
+                                   orb_remesh_method method, orb_merge_result *out) {
+  const int32_t *number = method == ORB_REMESH_TEMPLATE ? shapes[0].mesh->source_triangle : NULL;
   int32_t shape_count = out->supermesh.shape_count;
   out->shapes = ORB_NEW0(ctx, orb_shape_report, shape_count);
   if (!out->shapes) {
@@ -49,7 +50,7 @@ static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shap
   }
   ORB_TRY(orb_report_landmarks(ctx, shapes, landmarks, out));
   ORB_TRY(orb_report_found(ctx, shapes, out));
-  ORB_TRY(orb_report_pairs(ctx, out));
+  ORB_TRY(orb_report_pairs(ctx, number, out));
   orb_progress(ctx, "transfer", 1);
   return ORB_OK;
 }
@@ -127,7 +128,7 @@ orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, co
          fail);
   out->timings.remesh = (now = orb_clock()) - mark;
   mark = now;
-  ORB_GO(status, transfer_reports(ctx, shapes, landmarks, out), fail);
+  ORB_GO(status, transfer_reports(ctx, shapes, landmarks, remesh.method, out), fail);
   out->timings.transfer = (now = orb_clock()) - mark;
   mark = now;
   ORB_GO(status, write_asset(ctx, shapes, shape_count, names, options, out), fail);

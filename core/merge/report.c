@@ -228,10 +228,47 @@ static orb_status warn_of_pair(orb_context *ctx, orb_merge_result *out, const or
   return ORB_OK;
 }
 
+/* Twice the area of a triangle. */
+static double area_of(const double *positions, const int32_t *corner) {
+  double u[3], w[3], n[3];
+  orb_sub(positions + 3 * (int64_t)corner[1], positions + 3 * (int64_t)corner[0], u);
+  orb_sub(positions + 3 * (int64_t)corner[2], positions + 3 * (int64_t)corner[0], w);
+  orb_cross(u, w, n);
+  return orb_length(n);
+}
+
+/* Counts the triangles that are inverted on either shape of the pair, and lists the largest that have a number. */
+static void list_inverted(const orb_supermesh *supermesh, double *const *positions, unsigned char *const *inverted,
+                          const int32_t *number, orb_pair_report *pair) {
+  double size[ORB_INVERTED_LISTED];
+  for (int32_t t = 0; t < supermesh->triangle_count; t++) {
+    if (!inverted[pair->a][t] && !inverted[pair->b][t]) {
+      continue;
+    }
+    pair->inverted_count++;
+    if (!number || number[t] < 0) {
+      continue;
+    }
+    const int32_t *corner = supermesh->triangles + 3 * (int64_t)t;
+    const double own = fmax(area_of(positions[pair->a], corner), area_of(positions[pair->b], corner));
+    int32_t at = pair->inverted_listed;
+    if (at == ORB_INVERTED_LISTED && !(own > size[at - 1])) {
+      continue;
+    }
+    at = at == ORB_INVERTED_LISTED ? at - 1 : pair->inverted_listed++;
+    for (; at > 0 && own > size[at - 1]; at--) {
+      size[at] = size[at - 1];
+      pair->inverted_triangles[at] = pair->inverted_triangles[at - 1];
+    }
+    size[at] = own;
+    pair->inverted_triangles[at] = number[t];
+  }
+  pair->inverted_fraction = (double)pair->inverted_count / supermesh->triangle_count;
+}
+
 static orb_status measure_pair(orb_context *ctx, orb_merge_result *out, double *const *positions, const double *moves,
-                               unsigned char *const *inverted, orb_pair_report *pair) {
+                               orb_pair_report *pair) {
   const orb_supermesh *supermesh = &out->supermesh;
-  int64_t inverted_count = 0;
   int32_t *shapely = ORB_NEW(ctx, int32_t, 3 * (int64_t)supermesh->triangle_count);
   if (!shapely) {
     return ORB_E_NO_MEMORY;
@@ -248,17 +285,10 @@ static orb_status measure_pair(orb_context *ctx, orb_merge_result *out, double *
     status = warn_of_pair(ctx, out, &map, pair->a, pair->b);
   }
   orb_free(ctx, shapely);
-  if (status != ORB_OK) {
-    return status;
-  }
-  for (int64_t t = 0; t < supermesh->triangle_count; t++) {
-    inverted_count += inverted[pair->a][t] | inverted[pair->b][t];
-  }
-  pair->inverted_fraction = (double)inverted_count / supermesh->triangle_count;
-  return ORB_OK;
+  return status;
 }
 
-orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
+orb_status orb_report_pairs(orb_context *ctx, const int32_t *number, orb_merge_result *out) {
   const orb_supermesh *supermesh = &out->supermesh;
   int32_t shape_count = supermesh->shape_count;
   double **positions = ORB_NEW0(ctx, double *, shape_count);
@@ -289,7 +319,8 @@ orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
     list_pairs(shape_count, out->pairs);
   }
   for (int32_t i = 0; status == ORB_OK && i < out->pair_count; i++) {
-    status = measure_pair(ctx, out, positions, moves, inverted, &out->pairs[i]);
+    list_inverted(supermesh, positions, inverted, number, &out->pairs[i]);
+    status = measure_pair(ctx, out, positions, moves, &out->pairs[i]);
   }
   for (int32_t s = 0; s < shape_count; s++) {
     if (positions) {

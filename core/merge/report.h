@@ -11,7 +11,8 @@ ORB_MUST_CHECK orb_status orb_report_landmarks(orb_context *ctx, const orb_align
 /* Fills out->found_residuals and found_names. Needs out->alignment, supermesh and shapes. */
 ORB_MUST_CHECK orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out);
 
-/* Fills out->pairs and out->warnings. Needs out->alignment and supermesh. */
-ORB_MUST_CHECK orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out);
+/* Fills out->pairs and out->warnings. Needs out->alignment and supermesh. number: of each triangle of the supermesh in
+ * the first shape's file, below 0: none; NULL: the supermesh is not that file's mesh. */
+ORB_MUST_CHECK orb_status orb_report_pairs(orb_context *ctx, const int32_t *number, orb_merge_result *out);
 
 #endif

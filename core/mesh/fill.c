@@ -2,9 +2,10 @@
  *
  * A loop of up to SMALL edges gets the triangulation of least area (dynamic programming, Barequet & Sharir 1995); a
  * larger one is cut like a polygon. Either may use a diagonal that is already an edge of the mesh. Where that happens,
- * all loops are closed by fans around a new vertex each instead, which cannot clash. A new vertex stands for no vertex
- * of the file: its source is the lowest one of its loop. New faces have source_triangle ORB_MADE_FILL and take their
- * attributes from the faces across the loop.
+ * all such loops are closed by fans around a new vertex each instead, which cannot clash. With ORB_FILL_FAIR the
+ * polygon of a larger loop is refined and made fair (patch.h, fair.h), which cannot clash either: large flat triangles
+ * would stand for most of the sphere. A new vertex stands for no vertex of the file: its source is the lowest one of
+ * its loop. New faces have source_triangle ORB_MADE_FILL and take their attributes from the faces across the loop.
  */
 #include "mesh/fill.h"
 
@@ -15,16 +16,27 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "mesh/edit.h"
+#include "mesh/fair.h"
+#include "mesh/patch.h"
 #include "mesh/polygon.h"
 #include "numeric/vec3.h"
 
 enum { SMALL = 48 }; /* edges; least area takes O(edges³) time and the tables below O(SMALL²) memory */
+
+/* Triangles of fair surfaces: for each edge of their rim (a disc needs about 11 at the patch's growth, a rim with short
+ * edges more), and in all. Those are solved in about three seconds. */
+enum { FAIR_AN_EDGE = 24, FAIR_LEAST = 4, FAIR_MOST = 131072 };
+/* How often a patch is refined and made fair: the fair surface is larger than the flat one, and its shape depends a
+ * little on the triangles that it starts from. */
+enum { FAIR_ROUNDS = 3 };
 
 typedef struct fill {
   orb_surface *s;
   int32_t *loop;   /* open half-edges of the current loop, in the order of the new faces */
   int32_t *vertex; /* their origins */
   int32_t *cut;    /* its triangulation: 3 indices into loop for each triangle */
+  int64_t later;   /* room that the loops after this one need: triangles if flat, at least as many as vertices */
+  int32_t fair;    /* triangles that fair surfaces may still have */
   orb_polygon polygon;
   double best[SMALL][SMALL];
   int split[SMALL][SMALL];
@@ -103,12 +115,16 @@ static void add_face(fill *f, const int32_t vertex[3], const int32_t like[3]) {
   }
 }
 
-static void close_with_diagonals(fill *f, int32_t count) {
+static void cut_loop(fill *f, int32_t count) {
   if (count <= SMALL) {
     cut_small(f, count);
   } else {
     orb_polygon_cut(&f->polygon, f->s->mesh->positions, f->vertex, count, f->cut);
   }
+}
+
+static void close_with_diagonals(fill *f, int32_t count) {
+  cut_loop(f, count);
   for (int32_t i = 0; i < count - 2; i++) {
     const int32_t *c = f->cut + 3 * i;
     add_face(f, (int32_t[3]){f->vertex[c[0]], f->vertex[c[1]], f->vertex[c[2]]},
@@ -140,6 +156,58 @@ static void close_with_fan(fill *f, int32_t count) {
   }
 }
 
+/* Adds the patch to the mesh. */
+static orb_status add_patch(fill *f, const orb_patch *patch) {
+  orb_mesh *mesh = f->s->mesh;
+  const int32_t first = mesh->vertex_count - patch->rim; /* of the mesh: the patch's vertex 0, had its rim been new */
+  if (patch->triangle_count + f->later > INT32_MAX - mesh->triangle_count) {
+    return orb_fail(f->s->ctx, ORB_E_TOO_LARGE, "The mesh would be too large with its holes filled.");
+  }
+  ORB_TRY(orb_mesh_reserve(f->s->ctx, mesh, patch->vertex_count + (int32_t)f->later,
+                           patch->triangle_count + (int32_t)f->later));
+  int32_t lowest = f->vertex[0];
+  for (int32_t i = 1; i < patch->rim; i++) {
+    lowest = mesh->source[f->vertex[i]] < mesh->source[lowest] ? f->vertex[i] : lowest;
+  }
+  for (int32_t v = patch->rim; v < patch->vertex_count; v++) {
+    for (int k = 0; k < 3; k++) {
+      mesh->positions[3 * (size_t)mesh->vertex_count + (size_t)k] =
+          patch->centre[k] + patch->scale * patch->positions[3 * (size_t)v + (size_t)k];
+    }
+    mesh->source[mesh->vertex_count++] = mesh->source[lowest];
+  }
+  for (int32_t t = 0; t < patch->triangle_count; t++) {
+    int32_t vertex[3], like[3];
+    for (int k = 0; k < 3; k++) {
+      const int32_t v = patch->triangles[3 * t + k];
+      vertex[k] = v < patch->rim ? f->vertex[v] : first + v;
+      like[k] = f->loop[patch->like[v]];
+    }
+    add_face(f, vertex, like);
+  }
+  f->fair -= patch->triangle_count;
+  return ORB_OK;
+}
+
+static orb_status close_fairly(fill *f, int32_t count) {
+  orb_patch patch = {0};
+  const int64_t wanted = FAIR_AN_EDGE * (int64_t)count;
+  cut_loop(f, count);
+  orb_status status = orb_patch_open(f->s->ctx, f->s->mesh->positions, f->vertex, count, f->cut,
+                                     wanted < f->fair ? (int32_t)wanted : f->fair, &patch);
+  for (int round = 0; round < FAIR_ROUNDS && status == ORB_OK; round++) {
+    status = orb_patch_refine(f->s->ctx, &patch);
+    if (status == ORB_OK) {
+      status = orb_patch_fair(f->s, f->loop, &patch);
+    }
+  }
+  if (status == ORB_OK) {
+    status = add_patch(f, &patch);
+  }
+  orb_patch_close(f->s->ctx, &patch);
+  return status;
+}
+
 /* Collects the loop of h in reverse: new faces run against the old ones. */
 static int32_t collect_loop(fill *f, int32_t h, unsigned char *seen) {
   int32_t count = 0;
@@ -158,11 +226,14 @@ static int32_t collect_loop(fill *f, int32_t h, unsigned char *seen) {
   return count;
 }
 
-/* Closes all loops, either with fans or with diagonals. */
-static orb_status close_all(fill *f, int fans, int64_t *loops) {
+/* fans: for loops that are closed flat. *loops: how many; counted again. */
+static orb_status close_all(fill *f, orb_fill how, int fans, int64_t *loops) {
   orb_surface *s = f->s;
   int32_t half_edges = 3 * s->mesh->triangle_count; /* of the old faces */
+  ORB_TRY(orb_mesh_reserve(s->ctx, s->mesh, (int32_t)*loops, (int32_t)s->edges.open));
   *loops = 0;
+  f->later = s->edges.open;
+  f->fair = FAIR_MOST;
   unsigned char *seen = ORB_NEW0(s->ctx, unsigned char, half_edges);
   orb_status status = seen ? ORB_OK : ORB_E_NO_MEMORY;
   for (int32_t h = 0; h < half_edges && status == ORB_OK; h++) {
@@ -171,33 +242,38 @@ static orb_status close_all(fill *f, int fans, int64_t *loops) {
     }
     int32_t count = collect_loop(f, h, seen);
     ORB_ASSERT(count >= 3);
-    if (fans) {
+    f->later -= count;
+    if (how == ORB_FILL_FAIR && count > SMALL && FAIR_LEAST * (int64_t)count <= f->fair) {
+      status = close_fairly(f, count);
+    } else if (fans) {
       close_with_fan(f, count);
     } else {
       close_with_diagonals(f, count);
     }
     ++*loops;
-    status = orb_context_check(s->ctx);
+    status = status == ORB_OK ? orb_context_check(s->ctx) : status;
   }
   orb_free(s->ctx, seen);
   return status;
 }
 
-static orb_status grow_surface(orb_surface *s, int32_t faces) {
+/* Matches the edges anew, with the new faces. */
+static orb_status grow_surface(orb_surface *s) {
+  const int32_t faces = s->mesh->triangle_count;
   orb_free(s->ctx, s->twin);
   orb_free(s->ctx, s->piece);
   orb_free(s->ctx, s->reversed);
   s->twin = ORB_NEW(s->ctx, int32_t, 3 * (size_t)faces);
   s->piece = ORB_NEW(s->ctx, int32_t, faces);
   s->reversed = ORB_NEW(s->ctx, unsigned char, faces);
-  return s->twin && s->piece && s->reversed ? ORB_OK : ORB_E_NO_MEMORY;
+  return s->twin && s->piece && s->reversed ? orb_surface_rematch(s) : ORB_E_NO_MEMORY;
 }
 
-static orb_status run(fill *f, int fans, int64_t *count) {
+static orb_status run(fill *f, orb_fill how, int64_t *count) {
   orb_surface *s = f->s;
   orb_mesh *mesh = s->mesh;
   int64_t loops = 0, open = s->edges.open, before = s->edges.crowded;
-  int32_t faces = mesh->triangle_count;
+  const int32_t faces = mesh->triangle_count, vertices = mesh->vertex_count;
   ORB_TRY(orb_surface_loops(s, &loops));
   if (3 * (faces + open) > INT32_MAX) {
     return orb_fail(s->ctx, ORB_E_TOO_LARGE, "The mesh would be too large with its holes filled.");
@@ -209,27 +285,26 @@ static orb_status run(fill *f, int fans, int64_t *count) {
     return ORB_E_NO_MEMORY;
   }
   ORB_TRY(orb_polygon_reserve(s->ctx, &f->polygon, (int32_t)open));
-  ORB_TRY(orb_mesh_reserve(s->ctx, mesh, (int32_t)loops, (int32_t)open));
-  ORB_TRY(close_all(f, fans, &loops));
-  ORB_TRY(grow_surface(s, faces + (int32_t)open));
-  ORB_TRY(orb_surface_rematch(s));
+  ORB_TRY(close_all(f, how, how == ORB_FILL_FANS, &loops));
+  ORB_TRY(grow_surface(s));
   if (s->edges.crowded > before || s->edges.open > 0) {
     mesh->triangle_count = faces;
+    mesh->vertex_count = vertices;
     ORB_TRY(orb_surface_rematch(s));
-    ORB_TRY(close_all(f, 1, &loops));
-    ORB_TRY(orb_surface_rematch(s));
+    ORB_TRY(close_all(f, how, 1, &loops));
+    ORB_TRY(grow_surface(s));
   }
   *count = loops;
   return ORB_OK;
 }
 
-orb_status orb_surface_fill(orb_surface *s, int fans, int64_t *loops) {
+orb_status orb_surface_fill(orb_surface *s, orb_fill how, int64_t *loops) {
   fill *f = orb_calloc(s->ctx, 1, sizeof *f);
   if (!f) {
     return ORB_E_NO_MEMORY;
   }
   f->s = s;
-  orb_status status = run(f, fans, loops);
+  orb_status status = run(f, how, loops);
   orb_polygon_free(s->ctx, &f->polygon);
   orb_free(s->ctx, f->loop);
   orb_free(s->ctx, f->vertex);

@@ -4,8 +4,14 @@
 
 #include "mesh/surface.h"
 
-/* Closes each boundary loop with triangles. fans: each with a fan around a new vertex, which uses no diagonal.
- * *loops: how many. O(F), and O(48²) for each edge of a short loop. */
-ORB_MUST_CHECK orb_status orb_surface_fill(orb_surface *surface, int fans, int64_t *loops);
+typedef enum orb_fill {
+  ORB_FILL_FLAT, /* no new vertices, where the edges allow that */
+  ORB_FILL_FANS, /* a fan around a new vertex, which uses no diagonal */
+  ORB_FILL_FAIR  /* flat up to 48 edges; a longer loop gets a surface that continues the one around it */
+} orb_fill;
+
+/* Closes each boundary loop with triangles. *loops: how many. O(F), and O(48²) for each edge of a short loop. Fair
+ * surfaces have at most 131,072 triangles together; loops beyond that are flat. */
+ORB_MUST_CHECK orb_status orb_surface_fill(orb_surface *surface, orb_fill how, int64_t *loops);
 
 #endif

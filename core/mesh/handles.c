@@ -153,7 +153,7 @@ static orb_status cut(orb_surface *s, const orb_cycles *cycles, int fans, double
   }
   orb_status status = orb_surface_rematch(s);
   if (status == ORB_OK) {
-    status = orb_surface_fill(s, fans, &loops);
+    status = orb_surface_fill(s, fans ? ORB_FILL_FANS : ORB_FILL_FLAT, &loops);
   }
   if (status == ORB_OK) {
     ORB_ASSERT(loops == 2 * (int64_t)cycles->count);

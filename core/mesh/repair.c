@@ -189,7 +189,7 @@ static orb_status close_surface(orb_surface *s, unsigned repair, int32_t made) {
   orb_mesh_note(s->mesh, "split-vertices", fans.pinched);
   int64_t loops;
   const int32_t old = s->mesh->triangle_count;
-  ORB_TRY(orb_surface_fill(s, 0, &loops));
+  ORB_TRY(orb_surface_fill(s, made == ORB_MADE_FILL ? ORB_FILL_FAIR : ORB_FILL_FLAT, &loops));
   for (int32_t t = old; t < s->mesh->triangle_count; t++) {
     s->mesh->source_triangle[t] = made;
   }

@@ -2,11 +2,11 @@
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { readFile, writeFile } from 'node:fs/promises';
-import { createRequire } from 'node:module';
 import path from 'node:path';
 import test from 'node:test';
 import { folder, run } from './support/cli.mjs';
-import { assertProblem, daemon, root, samples } from './support/daemon.mjs';
+import { assertProblem, daemon, samples } from './support/daemon.mjs';
+import { draco, encoder } from './support/draco.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const near = (a, b, part, what) => assert.ok(Math.abs(a - b) <= part * Math.abs(b), `${what}: ${a}, expected ${b}`);
@@ -38,78 +38,6 @@ test('quantized and meshopt-compressed glTF are read: the mesh is that of the pl
     assert.ok([200, 201, 400, 413, 422].includes((await d.upload(damaged)).status), `byte ${at}`);
   }
 });
-
-const encoder = path.join(root, 'client/web/node_modules/three/examples/jsm/libs/draco/draco_encoder.js');
-
-/** A GLB of one primitive that Draco has compressed, with Google's encoder. */
-async function draco({ positions, triangles }) {
-  // three is a package of modules, this file is not one
-  const loaded = { exports: {} };
-  const run = new Function('module', 'exports', 'require', '__filename', '__dirname', await readFile(encoder, 'utf8'));
-  run(loaded, loaded.exports, createRequire(import.meta.url), encoder, path.dirname(encoder));
-  const module = loaded.exports(); // no await: it is a thenable that resolves to itself
-  const made = new module.Encoder();
-  const mesh = new module.Mesh();
-  const builder = new module.MeshBuilder();
-  builder.AddFacesToMesh(mesh, triangles.length, new Uint32Array(triangles.flat()));
-  const id = builder.AddFloatAttributeToMesh(
-    mesh,
-    module.POSITION,
-    positions.length,
-    3,
-    new Float32Array(positions.flat()),
-  );
-  made.SetAttributeQuantization(module.POSITION, 14);
-  const out = new module.DracoInt8Array();
-  const length = made.EncodeMeshToDracoBuffer(mesh, out);
-  const bytes = Buffer.from(Array.from({ length }, (_, i) => out.GetValue(i) & 255));
-  const range = (pick) => [0, 1, 2].map((k) => pick(...positions.map((p) => p[k])));
-  const json = {
-    asset: { version: '2.0' },
-    extensionsUsed: ['KHR_draco_mesh_compression'],
-    extensionsRequired: ['KHR_draco_mesh_compression'],
-    buffers: [{ byteLength: length }],
-    bufferViews: [{ buffer: 0, byteLength: length }],
-    accessors: [
-      { componentType: 5126, type: 'VEC3', count: positions.length, min: range(Math.min), max: range(Math.max) },
-      { componentType: 5125, type: 'SCALAR', count: 3 * triangles.length },
-    ],
-    meshes: [
-      {
-        primitives: [
-          {
-            attributes: { POSITION: 0 },
-            indices: 1,
-            extensions: { KHR_draco_mesh_compression: { bufferView: 0, attributes: { POSITION: id } } },
-          },
-        ],
-      },
-    ],
-    nodes: [{ mesh: 0, scale: [2, 2, 2] }],
-    scenes: [{ nodes: [0] }],
-    scene: 0,
-  };
-  const pad = (b, fill) => Buffer.concat([b, Buffer.alloc((4 - (b.length % 4)) % 4, fill)]);
-  const chunk = (type, b) => {
-    const head = Buffer.alloc(8);
-    head.writeUInt32LE(b.length);
-    head.writeUInt32LE(type, 4);
-    return Buffer.concat([head, b]);
-  };
-  const body = Buffer.concat([
-    chunk(0x4e4f534a, pad(Buffer.from(JSON.stringify(json)), ' ')),
-    chunk(0x004e4942, pad(bytes, 0)),
-  ]);
-  const head = Buffer.alloc(12);
-  head.write('glTF');
-  head.writeUInt32LE(2, 4);
-  head.writeUInt32LE(12 + body.length, 8);
-  return {
-    glb: Buffer.concat([head, body]),
-    at: 12 + 8 + pad(Buffer.from(JSON.stringify(json)), ' ').length + 8,
-    length,
-  };
-}
 
 test('Draco-compressed glTF is read, and damaged data is refused', { skip: !existsSync(encoder) }, async (t) => {
   const d = await daemon(t);

@@ -3,6 +3,7 @@
 #   docs/morph.webp                    the film of the README, made in the studio
 #   docs/studio.png                    the studio, in Chromium
 #   docs/tutorial.png, tutorial-sheet  the tutorial's page in Chromium and its sheet (they need tests/node_modules)
+#   docs/holes-open.png, holes-filled  half an elephant, open and filled
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
 bin=$PWD/build/bin
@@ -23,3 +24,12 @@ samples=tests/samples
 node tests/tools/film.mjs
 ORB_PICTURE=docs/studio.png node tests/studio/looks.mjs landmarks
 ORB_PICTURES=1 node --test tests/conformance/tutorial.test.mjs
+
+node tests/tools/holes.mjs "$work/half.obj"
+node tests/tools/holes.mjs "$work/tall.obj" 1.25
+for kind in open:template:reopen filled:adaptive:filled; do
+  IFS=: read -r name method holes <<<"$kind"
+  "$bin/orbmorph" morph "$work/half.obj" "$work/tall.obj" --repair fill_holes --align rotate --remesh "$method" \
+    --set "asset.holes=$holes" -o "$work/$name.glb"
+  "$bin/orbmorph" view "$work/$name.glb" -o "docs/holes-$name.png" --poses 2 --size 360 --wire --inside --yaw 250
+done

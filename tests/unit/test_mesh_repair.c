@@ -13,6 +13,7 @@
 #include "numeric/vec3.h"
 #include "orbmorph/format.h"
 #include "support_context.h"
+#include "support_remesh.h"
 #include "support_shapes.h"
 
 static orb_status read_repaired(const char *text, unsigned repair, orb_mesh *mesh) {
@@ -212,7 +213,7 @@ static void test_torus(void **state) {
 /* A sphere of rings without its caps: two loops; filled, its volume is that of the polyhedron with flat caps. */
 static void test_fill(void **state) {
   (void)state;
-  for (int n = 5; n < 90; n += 40) { /* small loops and one that is cut as a polygon */
+  for (int n = 5; n < 50; n += 40) {
     static char text[65536];
     char *p = text;
     for (int i = 0; i < 2 * n; i++) {
@@ -234,6 +235,116 @@ static void test_fill(void **state) {
     assert_true(fabs(extent.volume - 0.5 * n * sin(2 * M_PI / n)) < 1e-12); /* a prism of height 1 */
     orb_mesh_free(ctx, &mesh);
   }
+}
+
+/* The part of a ball whose triangles `keep` wants, as OBJ; free() it. */
+static char *cut_ball(int levels, int (*keep)(const double *)) {
+  orb_mesh ball = shape_ball(ctx, levels);
+  char *text = malloc(80 * (size_t)(ball.vertex_count + ball.triangle_count)), *p = text;
+  assert_non_null(text);
+  for (int32_t v = 0; v < ball.vertex_count; v++) {
+    const double *x = ball.positions + 3 * v;
+    p += sprintf(p, "v %.17g %.17g %.17g\n", x[0], x[1], x[2]);
+  }
+  for (int32_t t = 0; t < ball.triangle_count; t++) {
+    const int32_t *c = ball.triangles + 3 * t;
+    double middle[3];
+    for (int k = 0; k < 3; k++) {
+      middle[k] = ball.positions[3 * c[0] + k] + ball.positions[3 * c[1] + k] + ball.positions[3 * c[2] + k];
+    }
+    orb_normalize(middle);
+    if (keep(middle)) {
+      p += sprintf(p, "f %d %d %d\n", c[0] + 1, c[1] + 1, c[2] + 1);
+    }
+  }
+  shape_free(ctx, &ball);
+  return text;
+}
+
+static void cut_and_fill(int levels, int (*keep)(const double *), orb_mesh *mesh) {
+  char *text = cut_ball(levels, keep);
+  assert_int_equal(read_repaired(text, ORB_REPAIR_FILL_HOLES, mesh), ORB_OK);
+  assert_int_equal(shape_repaired(mesh, "fill_holes"), 1);
+  free(text);
+}
+
+static int beside_cap(const double *p) {
+  return p[2] < cos(0.7);
+}
+
+static int beside_band(const double *p) { /* an eye mask of a hole: long, bent, and with corners */
+  return !(p[0] > 0.2 && fabs(p[2]) < 0.35);
+}
+
+/* A ball that lacks a part gets nearly that part again: no point of what fills it is a tenth as far from the ball as
+ * the flat disc in a cap's rim. Its triangles grow from the rim inwards, where a polygon's diagonals cross the whole
+ * hole. */
+static void test_fair_fill(void **state) {
+  (void)state;
+  const double flat = 1 - cos(0.7), across = 2 * sin(0.7);
+  for (int band = 0; band < 2; band++) {
+    orb_mesh mesh;
+    cut_and_fill(5, band ? beside_band : beside_cap, &mesh);
+    for (int32_t v = 0; v < mesh.vertex_count; v++) {
+      assert_true(fabs(orb_length(mesh.positions + 3 * v) - 1) < 0.1 * flat);
+    }
+    for (int32_t h = 0; h < 3 * mesh.triangle_count; h++) {
+      const double *p = mesh.positions + 3 * mesh.triangles[h];
+      const double *q = mesh.positions + 3 * mesh.triangles[h % 3 == 2 ? h - 2 : h + 1];
+      assert_true(sqrt(orb_distance2(p, q)) < 0.25 * across);
+    }
+    orb_mesh_free(ctx, &mesh);
+  }
+}
+
+/* Every allocation fails once; the repair reports it and leaks nothing. */
+static void test_fair_fill_without_memory(void **state) {
+  (void)state;
+  char *text = cut_ball(5, beside_cap);
+  int failures = 0;
+  for (int64_t after = 0, done = 0; !done; after++) {
+    int64_t left = INT64_MAX;
+    orb_context *failing = remesh_failing_context(&left);
+    orb_mesh mesh;
+    assert_int_equal(orb_mesh_read(failing, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, &mesh, NULL),
+                     ORB_OK);
+    left = after;
+    orb_status status = orb_mesh_repair(failing, &mesh, ORB_REPAIR_FILL_HOLES);
+    done = status == ORB_OK;
+    assert_true(done || status == ORB_E_NO_MEMORY);
+    failures += !done;
+    left = INT64_MAX;
+    orb_mesh_free(failing, &mesh);
+    orb_context_destroy(failing); /* asserts that all was freed */
+  }
+  assert_true(failures > 50);
+  free(text);
+}
+
+/* A tube of length 1 whose ends have many edges: each gets a dome, between the flat cap and the half ball. The
+ * triangles of the domes are O(edges), as the limit of a file must not be reached by holes. */
+static void test_fair_fill_of_tube(void **state) {
+  (void)state;
+  const int n = 1000;
+  char *text = malloc(300 * (size_t)n), *p = text;
+  assert_non_null(text);
+  for (int i = 0; i < 4 * n; i++) { /* rings near the ends, so that the faces there are not needles */
+    const double a = 2 * M_PI * (i % n) / n, z[4] = {0, 0.01, 0.99, 1};
+    p += sprintf(p, "v %.17g %.17g %g\n", cos(a), sin(a), z[i / n]);
+  }
+  for (int i = 0; i < 3 * n; i++) {
+    int j = i / n * n + (i + 1) % n;
+    p += sprintf(p, "f %d %d %d %d\n", i + 1, j + 1, n + j + 1, n + i + 1);
+  }
+  orb_mesh mesh;
+  orb_extent extent;
+  assert_int_equal(read_repaired(text, ORB_REPAIR_FILL_HOLES, &mesh), ORB_OK);
+  assert_int_equal(shape_repaired(&mesh, "fill_holes"), 2);
+  assert_true(mesh.triangle_count < 6 * n + 2 * 16 * n);
+  orb_mesh_extent(&mesh, &extent);
+  assert_true(extent.volume > M_PI + 0.5 && extent.volume < M_PI * (1 + 4.0 / 3));
+  orb_mesh_free(ctx, &mesh);
+  free(text);
 }
 
 /* A concave polygon: an L of area 3, extruded by nothing: the areas of its triangles must add up to its own. */
@@ -270,6 +381,9 @@ int main(void) {
                                      cmocka_unit_test(test_parts),
                                      cmocka_unit_test(test_torus),
                                      cmocka_unit_test(test_fill),
+                                     cmocka_unit_test(test_fair_fill),
+                                     cmocka_unit_test(test_fair_fill_of_tube),
+                                     cmocka_unit_test(test_fair_fill_without_memory),
                                      cmocka_unit_test(test_concave_polygon),
                                      cmocka_unit_test(test_copy)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);

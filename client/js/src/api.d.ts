@@ -467,6 +467,10 @@ export type Supermesh = {
     distortion: Distortion;
     /** The share of the supermesh's triangles that are inverted on either shape: they face away from the smooth normals of the surface at their corners and from its face at their centre. */
     inverted_fraction: number | null;
+    /** Their number. Absent if an older engine made the supermesh. */
+    inverted_count?: number;
+    /** With the method `template`: the largest of them, as triangles of the file of the first shape, counted from 0 after polygons are cut into triangles; the largest first. Empty with other methods. Absent if an older engine made the supermesh. */
+    inverted_triangles?: number[];
   }>;
   /** Where the map between the shapes of a pair is bad; empty if it is good everywhere. Absent if an older engine made the supermesh. */
   warnings?: Array<{

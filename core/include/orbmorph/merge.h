@@ -31,6 +31,8 @@ typedef struct orb_merge_timings {
 /* Distortion of the composed map from shape a to shape b, a < b. It leaves out the triangles of the supermesh that are
  * slivers on a or b (height below about a ninetieth of the longest side), unless nearly all are. There is a report for
  * each pair of up to four shapes; for more shapes, for each pair of neighbours in their order. */
+enum { ORB_INVERTED_LISTED = 32 };
+
 typedef struct orb_pair_report {
   int32_t a, b;
   /* Its means are unbounded: a single triangle that collapses on one of the shapes can dominate them. median and p99
@@ -40,6 +42,10 @@ typedef struct orb_pair_report {
    * and from its face at their centre. Degenerate ones (twice the area at most 1e-12 of the squared
    * diagonal) do not count. */
   double inverted_fraction;
+  int64_t inverted_count;
+  /* With the method template, the largest of them (on a or b) as numbers of the first shape's file, the largest first.
+   * Triangles that a repair made have none and are not listed. */
+  int32_t inverted_listed, inverted_triangles[ORB_INVERTED_LISTED];
 } orb_pair_report;
 
 enum { ORB_WARNING_PARTS = 4, ORB_WARNING_TRIANGLES = 32 };

@@ -60,14 +60,22 @@ export function morphOf(bytes) {
   const shapes = [];
   const triangles = [];
   const deltas = [];
+  const append = (lists, k, values) => {
+    lists[k] ??= [];
+    for (const x of values) lists[k].push(x);
+  };
   let first = 0;
   for (const primitive of gltf.meshes[0].primitives) {
     const base = read(primitive.attributes.POSITION);
-    (shapes[0] ??= []).push(...base);
+    append(shapes, 0, base);
     (primitive.targets ?? []).forEach((target, k) => {
       const delta = read(target.POSITION);
-      (shapes[k + 1] ??= []).push(...delta.map((d, i) => base[i] + d));
-      (deltas[k] ??= []).push(...delta);
+      append(
+        shapes,
+        k + 1,
+        delta.map((d, i) => base[i] + d),
+      );
+      append(deltas, k, delta);
     });
     for (const v of read(primitive.indices)) triangles.push(v + first);
     first += base.length / 3;

@@ -1,6 +1,6 @@
 #define EIGEN_MPL2_ONLY  // of Eigen only what is under the MPL 2.0
 
-#include "elastic/factor.h"
+#include "numeric/factor.h"
 
 #include <exception>
 #include <memory>

@@ -1,7 +1,7 @@
 /* A symmetric positive definite sparse matrix that is factorised again and again with other values on its diagonal, by
  * Eigen's templates: nothing is linked. */
-#ifndef ORB_ELASTIC_FACTOR_H
-#define ORB_ELASTIC_FACTOR_H
+#ifndef ORB_NUMERIC_FACTOR_H
+#define ORB_NUMERIC_FACTOR_H
 
 #include "orbmorph/context.h"
 

@@ -1,0 +1,148 @@
+// Real meshes as templates: vertices, their order, corners and attributes stay, bit for bit. The readers here are not
+// orbmorph's. ORB_TEMPLATE_MOST: the largest mesh, in triangles; tests/long.sh takes all of them.
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import test from 'node:test';
+import { daemon } from './support/daemon.mjs';
+import { morphOf, parseGlb } from './support/glb.mjs';
+import * as real from './support/real.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const most = Number(process.env.ORB_TEMPLATE_MOST ?? 6000);
+const triple = (i) => [3 * i, 3 * i + 1, 3 * i + 2];
+
+function readObj(text) {
+  const lists = { v: [], vt: [], vn: [] };
+  const faces = [];
+  for (const line of text.split('\n')) {
+    const [kind, ...words] = line.trim().split(/\s+/);
+    lists[kind]?.push(words.map(Number));
+    const pick = (word) => word.split('/').map((at, i) => Number(at) + (at < 0 ? Object.values(lists)[i].length : -1));
+    if (kind === 'f') faces.push(words.map(pick));
+  }
+  const corners = faces.every((face) => face.length === 3) ? faces.flat() : undefined; // else the order of cuts is unknown
+  const [uv, normals] = ['vt', 'vn'].map(
+    (kind, i) =>
+      corners &&
+      lists[kind].length > 0 && {
+        values: lists[kind],
+        of: corners.map((corner) => corner[i + 1]),
+      },
+  );
+  return { positions: lists.v, corners: corners?.map(([v]) => v), uv, normals };
+}
+
+function readStl(bytes) {
+  const count = bytes.readUInt32LE(80);
+  const positions =
+    bytes.length === 84 + 50 * count
+      ? Array.from({ length: 3 * count }, (_, i) =>
+          [0, 4, 8].map((k) => bytes.readFloatLE(84 + 50 * Math.floor(i / 3) + 12 + 12 * (i % 3) + k)),
+        )
+      : [...bytes.toString().matchAll(/vertex\s+(\S+)\s+(\S+)\s+(\S+)/g)].map((found) => found.slice(1).map(Number));
+  return { positions, corners: positions.map((_, i) => i) };
+}
+
+/** ASCII, three corners a face. */
+function readOff(text) {
+  const words = text.replace(/#.*$/gm, '').trim().split(/\s+/).slice(1).map(Number);
+  const [vertices, faces] = words;
+  const positions = Array.from({ length: vertices }, (_, v) => triple(v).map((i) => words[3 + i]));
+  const lists = Array.from({ length: faces }, (_, t) =>
+    words.slice(3 + 3 * vertices + 4 * t, 7 + 3 * vertices + 4 * t),
+  );
+  assert.ok(lists.every(([corners]) => corners === 3));
+  return { positions, corners: lists.flatMap((list) => list.slice(1)) };
+}
+
+/** Binary: three floats a vertex, then lists of three 32-bit integers. */
+function readPly(bytes) {
+  const start = bytes.indexOf('end_header\n') + 11;
+  const head = bytes.toString('latin1', 0, start);
+  assert.match(head, /binary_little_endian[\s\S]*property float x\nproperty float y\nproperty float z\nelement face/);
+  assert.match(head, /property list uchar int \w+\nend_header\n$/);
+  const count = (name) => Number(new RegExp(`element ${name} (\\d+)`).exec(head)[1]);
+  const positions = Array.from({ length: count('vertex') }, (_, v) =>
+    triple(v).map((i) => bytes.readFloatLE(start + 4 * i)),
+  );
+  const lists = start + 12 * positions.length;
+  const corners = Array.from({ length: 3 * count('face') }, (_, i) => {
+    const list = lists + 13 * Math.floor(i / 3);
+    assert.equal(bytes[list], 3);
+    return bytes.readInt32LE(list + 1 + 4 * (i % 3));
+  });
+  return { positions, corners };
+}
+
+/** One primitive. Its attributes are compared as bytes. */
+function readGlb(bytes) {
+  const { gltf, read } = parseGlb(bytes);
+  const { attributes, indices } = gltf.meshes[0].primitives[0];
+  const flat = read(attributes.POSITION);
+  const positions = Array.from({ length: flat.length / 3 }, (_, v) => triple(v).map((i) => flat[i]));
+  const kept = Object.entries(attributes).map(([name, accessor]) => [name, read(accessor)]);
+  return { positions, corners: [...read(indices)], kept };
+}
+
+const readers = {
+  glb: readGlb,
+  obj: (bytes) => readObj(bytes.toString()),
+  off: (bytes) => readOff(bytes.toString()),
+  ply: readPly,
+  stl: readStl,
+};
+
+for (const row of real.rows('good').filter((one) => Number(one.f) <= most))
+  test(row.name, async (t) => {
+    const d = await daemon(t);
+    const bytes = await readFile(row.file);
+    const file = readers[row.format](bytes);
+    const first = await d.upload(bytes, { name: 'first' });
+    assert.equal(first.status, 201, JSON.stringify(first.json));
+    const second = (await d.upload(shapes.obj(shapes.egg(3)), { name: 'egg' })).json;
+    const made = await d.made('/v1/supermeshes', {
+      shapes: [{ mesh: first.json.id }, { mesh: second.id }],
+      align: { method: 'rotate' },
+      remesh: { method: 'template' },
+      asset: { fit: 'none' },
+    });
+    const { shapes: at, deltas, triangles, gltf, read, count } = morphOf((await d.get(made.asset)).bytes);
+    assert.equal(gltf.meshes[0].primitives.length, 1);
+    const { attributes } = gltf.meshes[0].primitives[0];
+    const own = file.positions.length;
+    for (const [name, values] of file.kept ?? []) assert.deepEqual(read(attributes[name]), values, name);
+    assert.ok(
+      Buffer.from(Float32Array.from(file.positions.flat()).buffer).equals(
+        Buffer.from(Float32Array.from(at[0].slice(0, 3 * own)).buffer),
+      ),
+    );
+    if (!file.corners) return;
+    assert.equal(triangles.length, file.corners.length);
+    const values = new Set();
+    const [uv, normals] = [file.uv && read(attributes.TEXCOORD_0), file.normals && read(attributes.NORMAL)];
+    triangles.forEach((v, i) => {
+      const corner = file.corners[i];
+      assert.ok(v === corner || v >= own, `corner ${i}`);
+      for (const k of [0, 1, 2]) {
+        assert.equal(at[0][3 * v + k], at[0][3 * corner + k]);
+        assert.equal(deltas[0][3 * v + k], deltas[0][3 * corner + k], 'a seam moves alike');
+      }
+      const key = [corner];
+      if (uv) {
+        const [a, b] = file.uv.values[file.uv.of[i]].map(Math.fround);
+        assert.ok(uv[2 * v] === a && Math.abs(uv[2 * v + 1] - (1 - b)) < 1e-6, `texture coordinates of corner ${i}`);
+        key.push(a, b);
+      }
+      if (normals) {
+        const normal = file.normals.values[file.normals.of[i]];
+        const length = Math.hypot(...normal);
+        normal.forEach((x, k) => assert.ok(Math.abs(normals[3 * v + k] - x / length) < 1e-5, `normal of corner ${i}`));
+        key.push(...normal.map(Math.fround));
+      }
+      values.add(key.join());
+    });
+    assert.ok(
+      count <= Math.max(own, values.size + own - new Set(file.corners).size),
+      'a copy for each further value, no more',
+    );
+  });

@@ -1,0 +1,103 @@
+// Draco-compressed glTF, by Google's encoder and decoder as three has them.
+import { readFile } from 'node:fs/promises';
+import { createRequire } from 'node:module';
+import path from 'node:path';
+import { root } from './daemon.mjs';
+
+const folder = path.join(root, 'client/web/node_modules/three/examples/jsm/libs/draco');
+
+export const encoder = path.join(folder, 'draco_encoder.js');
+
+async function load(file) {
+  // three is a package of modules, this file is not one
+  const loaded = { exports: {} };
+  const run = new Function('module', 'exports', 'require', '__filename', '__dirname', await readFile(file, 'utf8'));
+  run(loaded, loaded.exports, createRequire(import.meta.url), file, path.dirname(file));
+  // wrapped, as it is a thenable that resolves to itself
+  return new Promise((resolve) => loaded.exports({ onModuleLoaded: (module) => resolve({ module }) }));
+}
+
+/** A GLB of one primitive that Draco has compressed, with Google's encoder. */
+export async function draco({ positions, triangles }) {
+  const { module } = await load(encoder);
+  const made = new module.Encoder();
+  const mesh = new module.Mesh();
+  const builder = new module.MeshBuilder();
+  builder.AddFacesToMesh(mesh, triangles.length, new Uint32Array(triangles.flat()));
+  const id = builder.AddFloatAttributeToMesh(
+    mesh,
+    module.POSITION,
+    positions.length,
+    3,
+    new Float32Array(positions.flat()),
+  );
+  made.SetAttributeQuantization(module.POSITION, 14);
+  const out = new module.DracoInt8Array();
+  const length = made.EncodeMeshToDracoBuffer(mesh, out);
+  const bytes = Buffer.from(Array.from({ length }, (_, i) => out.GetValue(i) & 255));
+  const range = (pick) => [0, 1, 2].map((k) => pick(...positions.map((p) => p[k])));
+  const json = {
+    asset: { version: '2.0' },
+    extensionsUsed: ['KHR_draco_mesh_compression'],
+    extensionsRequired: ['KHR_draco_mesh_compression'],
+    buffers: [{ byteLength: length }],
+    bufferViews: [{ buffer: 0, byteLength: length }],
+    accessors: [
+      { componentType: 5126, type: 'VEC3', count: positions.length, min: range(Math.min), max: range(Math.max) },
+      { componentType: 5125, type: 'SCALAR', count: 3 * triangles.length },
+    ],
+    meshes: [
+      {
+        primitives: [
+          {
+            attributes: { POSITION: 0 },
+            indices: 1,
+            extensions: { KHR_draco_mesh_compression: { bufferView: 0, attributes: { POSITION: id } } },
+          },
+        ],
+      },
+    ],
+    nodes: [{ mesh: 0, scale: [2, 2, 2] }],
+    scenes: [{ nodes: [0] }],
+    scene: 0,
+  };
+  const pad = (b, fill) => Buffer.concat([b, Buffer.alloc((4 - (b.length % 4)) % 4, fill)]);
+  const chunk = (type, b) => {
+    const head = Buffer.alloc(8);
+    head.writeUInt32LE(b.length);
+    head.writeUInt32LE(type, 4);
+    return Buffer.concat([head, b]);
+  };
+  const body = Buffer.concat([
+    chunk(0x4e4f534a, pad(Buffer.from(JSON.stringify(json)), ' ')),
+    chunk(0x004e4942, pad(bytes, 0)),
+  ]);
+  const head = Buffer.alloc(12);
+  head.write('glTF');
+  head.writeUInt32LE(2, 4);
+  head.writeUInt32LE(12 + body.length, 8);
+  return {
+    glb: Buffer.concat([head, body]),
+    at: 12 + 8 + pad(Buffer.from(JSON.stringify(json)), ' ').length + 8,
+    length,
+  };
+}
+
+/** The positions that a decoder reads, 3 a vertex, and the triangles. */
+export async function undraco(bytes, id) {
+  const { module } = await load(path.join(folder, 'draco_decoder.js'));
+  const decoder = new module.Decoder();
+  const buffer = new module.DecoderBuffer();
+  buffer.Init(new Int8Array(bytes), bytes.length);
+  const mesh = new module.Mesh();
+  decoder.DecodeBufferToMesh(buffer, mesh);
+  const values = new module.DracoFloat32Array();
+  decoder.GetAttributeFloatForAllPoints(mesh, decoder.GetAttributeByUniqueId(mesh, id), values);
+  const positions = Array.from({ length: 3 * mesh.num_points() }, (_, i) => values.GetValue(i));
+  const face = new module.DracoInt32Array();
+  const triangles = Array.from({ length: mesh.num_faces() }, (_, t) => {
+    decoder.GetFaceFromMesh(mesh, t, face);
+    return [0, 1, 2].map((k) => face.GetValue(k));
+  });
+  return { positions, triangles };
+}
