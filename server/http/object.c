@@ -122,6 +122,7 @@ int object_is_ready(request *r, object_kind kind, const char *sha) {
     }
     store_result result = verify_once(r->srv->store, kind, r->id, sha);
     r->is_unverified = result != STORE_OK && result != STORE_NOT_FOUND;
+    r->is_away = result == STORE_AWAY;
   }
   return 1;
 }
@@ -133,7 +134,7 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
       compresses = kind == OBJECT_ASSET || kind == OBJECT_QUANTIZED || kind == OBJECT_SPHERE || kind == OBJECT_SPHERES;
   uint64_t size, first = 0, length;
   if (r->is_unverified) {
-    reply_store(r, STORE_ERROR);
+    reply_store(r, r->is_away ? STORE_AWAY : STORE_ERROR);
     return 1;
   }
   stpcpy(stpncpy(stpcpy(etag, "\""), sha, 32), "\"");
