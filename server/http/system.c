@@ -152,7 +152,6 @@ static enum MHD_Result ready(request *r) {
   }
   if (objects_are_away(srv->store)) {
     reply_refuse(r, "unavailable", "The store of objects (S3) does not answer; the server's log says why.");
-    reply_header(r, "Retry-After", "5");
     return MHD_YES;
   }
   api_text json = {0};
