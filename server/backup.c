@@ -177,7 +177,8 @@ static int refuse_url(void) {
 /* Objects in a bucket: its versions are their backup. */
 static int refuse_bucket(void) {
   fputs(
-      "orbmorphd: backup and restore are for objects in files. Keep versions in the bucket, and copy the catalogue with "
+      "orbmorphd: backup and restore are for objects in files. Keep versions in the bucket, and copy the catalogue "
+      "with "
       "sqlite3 DATA/catalogue.sqlite '.backup FILE'; see docs/cluster.md\n",
       stderr);
   return 2;

@@ -472,8 +472,8 @@ static int consistent(config *out) {
     complain("tls-certificate and tls-key must both be set, or neither");
     return 0;
   }
-  return is_address(out->listen) && is_catalogue(out->catalogue) && is_objects(out->objects) && is_mode(out->socket_mode) &&
-         is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
+  return is_address(out->listen) && is_catalogue(out->catalogue) && is_objects(out->objects) &&
+         is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
          is_one_of("assets", out->assets, assets) && is_readable("s3-keys", out->s3_keys) &&
          is_one_of("isolate", out->isolate, isolate) && is_one_of("log-level", out->log_level, levels) &&
          is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) && are_hosts(out->hosts) &&

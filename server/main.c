@@ -391,8 +391,8 @@ static int start(server *srv, worker_pool **workers) {
   }
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  return listens && srv->memory && open_stores(srv) &&
-         check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
+  return listens && srv->memory && open_stores(srv) && check_catalogue(srv) &&
+         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) &&
          (srv->io = tasks_start((int)o->io_threads, NULL)) &&

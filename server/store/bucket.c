@@ -16,9 +16,9 @@
 #include "wake.h"
 
 enum {
-  TRIES = 4,        /* of a request, with 0.7 s of pauses in the mean: S3's own hiccups are shorter */
-  PROBE_MS = 1000,  /* between two questions whether S3 is back */
-  READ_TRIES = 3,   /* of a whole object that came with wrong bytes */
+  TRIES = 4,       /* of a request, with 0.7 s of pauses in the mean: S3's own hiccups are shorter */
+  PROBE_MS = 1000, /* between two questions whether S3 is back */
+  READ_TRIES = 3,  /* of a whole object that came with wrong bytes */
   BLOCK = 1 << 18,
 };
 static const char owner_name[] = "orbmorph-owner";
@@ -181,7 +181,8 @@ static store_result read_owner(object_bucket *b, char owner[BUCKET_OWNER + 1]) {
     log_error("the bucket %s does not exist at %s: create it, or correct --objects", p->bucket, p->host);
   } else if (result == STORE_UNFIT) {
     log_error(
-        "S3 at %s refuses the bucket %s: %s. Check the keys, the region, the clock and what the keys may do (GetObject, "
+        "S3 at %s refuses the bucket %s: %s. Check the keys, the region, the clock and what the keys may do "
+        "(GetObject, "
         "PutObject, DeleteObject, ListBucket)",
         p->host, p->bucket, answer.why);
   } else {
@@ -301,8 +302,7 @@ static store_result complete(object_bucket *b, const char *name, const char *que
 static store_result put_parts(object_bucket *b, const char *name, int fd, uint64_t size, const char *sha) {
   char upload[400] = "", encoded[1200], query[1400];
   s3_answer answer;
-  const s3_request begin = {
-      .method = "POST", .key = name, .query = "uploads=", .meta = sha, .to = -1, .tries = TRIES};
+  const s3_request begin = {.method = "POST", .key = name, .query = "uploads=", .meta = sha, .to = -1, .tries = TRIES};
   store_result result = ask(b, &begin, &answer);
   const char *at = answer.text;
   if (result == STORE_OK &&
@@ -344,14 +344,8 @@ store_result bucket_put(object_bucket *b, const char *name, int fd) {
   if (size > b->part) {
     return put_parts(b, name, fd, size, sha);
   }
-  const s3_request request = {.method = "PUT",
-                              .key = name,
-                              .from = fd,
-                              .size = size,
-                              .sha = sha,
-                              .meta = sha,
-                              .to = -1,
-                              .tries = TRIES};
+  const s3_request request = {
+      .method = "PUT", .key = name, .from = fd, .size = size, .sha = sha, .meta = sha, .to = -1, .tries = TRIES};
   return ask_only(b, &request);
 }
 
@@ -397,8 +391,8 @@ store_result bucket_delete(object_bucket *b, const char *name) {
 }
 
 /* Calls `each` for one page of a list. */
-static void each_of_page(const object_bucket *b, const char *page, void (*each)(void *user, const char *name, uint64_t size),
-                         void *user) {
+static void each_of_page(const object_bucket *b, const char *page,
+                         void (*each)(void *user, const char *name, uint64_t size), void *user) {
   const char *at = page;
   size_t prefix = strlen(b->options.place.prefix);
   char key[1100], size[32];
@@ -423,8 +417,7 @@ store_result bucket_each(object_bucket *b, void (*each)(void *user, const char *
     if (result == STORE_OK && answer.text) {
       const char *at = answer.text;
       each_of_page(b, answer.text, each, user);
-      more = s3_element(&at, "NextContinuationToken", token, sizeof token) &&
-             s3_encode(token, encoded, sizeof encoded);
+      more = s3_element(&at, "NextContinuationToken", token, sizeof token) && s3_encode(token, encoded, sizeof encoded);
     }
     free(answer.text);
   }

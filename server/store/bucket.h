@@ -1,7 +1,7 @@
 /* Objects in a bucket of S3, each with the SHA-256 of its bytes beside it, against which every read is checked.
  *
- * While S3 does not answer, or refuses, every call fails at once with STORE_AWAY, and a thread asks each second whether it is
- * back. A bucket belongs to one deployment: an object of its prefix names it. Any thread may call any function.
+ * While S3 does not answer, or refuses, every call fails at once with STORE_AWAY, and a thread asks each second whether
+ * it is back. A bucket belongs to one deployment: an object of its prefix names it. Any thread may call any function.
  */
 #ifndef ORB_STORE_BUCKET_H
 #define ORB_STORE_BUCKET_H

@@ -76,7 +76,7 @@ static void walk(int top, const char *within, int depth, file_list *list) {
 
 static int by_use(const void *a, const void *b) {
   const cached_file *first = a, *second = b;
-  return first->used.tv_sec != second->used.tv_sec ? (first->used.tv_sec < second->used.tv_sec ? -1 : 1)
+  return first->used.tv_sec != second->used.tv_sec    ? (first->used.tv_sec < second->used.tv_sec ? -1 : 1)
          : first->used.tv_nsec < second->used.tv_nsec ? -1
                                                       : first->used.tv_nsec > second->used.tv_nsec;
 }

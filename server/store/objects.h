@@ -1,12 +1,13 @@
 /* Objects: bytes named by an id, written once and never changed: in files of the data folder, or in a bucket of S3.
  *
- * Contract of files. A writer fills a temporary file and publishes it: fsync of the file, rename to its final path, fsync of the
- * folder. So an object exists completely or not at all, also after a crash. Temporary files live in one folder of the
- * same file system; objects_open() deletes those of a dead process. Any thread may call any function. Publishing the
- * same id twice is allowed, because equal ids have equal bytes.
+ * Contract of files. A writer fills a temporary file and publishes it: fsync of the file, rename to its final path,
+ * fsync of the folder. So an object exists completely or not at all, also after a crash. Temporary files live in one
+ * folder of the same file system; objects_open() deletes those of a dead process. Any thread may call any function.
+ * Publishing the same id twice is allowed, because equal ids have equal bytes.
  *
- * In a bucket, an object has its final name from the start, and S3 shows it completely or not at all. The folder `cache` of
- * the data folder then has verified copies of the objects that were used last, so a descriptor is always one of a file.
+ * In a bucket, an object has its final name from the start, and S3 shows it completely or not at all. The folder
+ * `cache` of the data folder then has verified copies of the objects that were used last, so a descriptor is always one
+ * of a file.
  */
 #ifndef ORB_STORE_OBJECTS_H
 #define ORB_STORE_OBJECTS_H
@@ -94,8 +95,9 @@ store_result objects_make_folder(const objects *store, object_kind kind, const c
 
 /* Deletes an object that no row names. While a backup runs, or S3 is away, it stays until objects_delete_held(). */
 store_result objects_delete(objects *store, object_kind kind, const char *id);
-/* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named: whether a row names the object again; called
- * while other threads are excluded. After a restart of the process the files stay until --gc. */
+/* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named:
+ * whether a row names the object again; called while other threads are excluded. After a restart of the process the
+ * files stay until --gc. */
 void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user);
 /* Opens the lock file of backups. A backup holds it exclusively (flock()), so the kernel releases it with the process;
  * whoever deletes an object shares it for that moment. −1 with the reason logged. */

@@ -139,7 +139,8 @@ static int has_catalogue(const char *data) {
 /* What can be said before the catalogue is opened, which may create it. here: the mark of the data folder. */
 static store_result match_bucket(const store_place *p, const char *here, const char *owner) {
   if (*here && !*owner) {
-    log_error("the bucket of --objects has none of the objects of %s: name the bucket and prefix that they are in", p->data);
+    log_error("the bucket of --objects has none of the objects of %s: name the bucket and prefix that they are in",
+              p->data);
     return STORE_UNFIT;
   }
   if ((*here && strcmp(here, owner) != 0) || (!*here && *owner && !p->catalogue && !has_catalogue(p->data))) {

@@ -2,8 +2,8 @@
  *
  * Which catalogue belongs to a data folder: its own, in SQLite, or one in PostgreSQL. The folder remembers the latter
  * in the file catalogue.postgresql, so that its objects are never taken for those of another catalogue, which would not
- * name them. In the same way the file objects.s3 remembers that the objects are in a bucket of S3, and a bucket remembers its
- * catalogue. */
+ * name them. In the same way the file objects.s3 remembers that the objects are in a bucket of S3, and a bucket
+ * remembers its catalogue. */
 #ifndef ORB_STORE_PLACE_H
 #define ORB_STORE_PLACE_H
 

@@ -15,9 +15,9 @@ enum {
   CONNECT_MS = 5000,
   SLOW_BYTES = 1024, /* a second, over SLOW_SECONDS: a store that is slower than that hangs */
   SLOW_SECONDS = 15,
-  SMALL_MS = 30000, /* limit of a request that has no file */
-  PAUSE_MS = 100,   /* mean of the first pause between tries; each further one is twice as long */
-  IDLE_MOST = 16,   /* connections kept open */
+  SMALL_MS = 30000,    /* limit of a request that has no file */
+  PAUSE_MS = 100,      /* mean of the first pause between tries; each further one is twice as long */
+  IDLE_MOST = 16,      /* connections kept open */
   TEXT_MOST = 4 << 20, /* a list of 1,000 names takes 0.4 MB */
 };
 
@@ -240,7 +240,8 @@ static int sign(s3 *store, const s3_request *r, const char *path, struct curl_sl
     *end = 0;
     fine = append(out, at);
   }
-  snprintf(line, sizeof line, "authorization: AWS4-HMAC-SHA256 Credential=%s/%.8s/%s/s3/aws4_request,SignedHeaders=%s,Signature=%s",
+  snprintf(line, sizeof line,
+           "authorization: AWS4-HMAC-SHA256 Credential=%s/%.8s/%s/s3/aws4_request,SignedHeaders=%s,Signature=%s",
            keys.access, date, o->place.region, names, signature);
   fine = fine && append(out, line) && append(out, "expect:") && append(out, "content-type:") &&
          append(out, "transfer-encoding:");

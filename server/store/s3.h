@@ -31,13 +31,13 @@ typedef struct s3_request {
 } s3_request;
 
 typedef struct s3_answer {
-  int status;          /* 0: no complete answer, see `why` */
-  char *text;          /* the body, of malloc(); NULL: none */
-  uint64_t size;       /* of the object: its Content-Length */
-  char meta[65];       /* x-amz-meta-sha256; "": none */
-  char tag[S3_TAG];    /* ETag */
-  int64_t modified;    /* Last-Modified, a Unix time; −1: not said */
-  char why[S3_WHY];    /* of a failure, the end of a sentence */
+  int status;       /* 0: no complete answer, see `why` */
+  char *text;       /* the body, of malloc(); NULL: none */
+  uint64_t size;    /* of the object: its Content-Length */
+  char meta[65];    /* x-amz-meta-sha256; "": none */
+  char tag[S3_TAG]; /* ETag */
+  int64_t modified; /* Last-Modified, a Unix time; −1: not said */
+  char why[S3_WHY]; /* of a failure, the end of a sentence */
 } s3_answer;
 
 /* NULL: out of memory, or libcurl cannot be initialised. */

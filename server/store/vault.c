@@ -126,7 +126,8 @@ static void name_aside(const vault *v, const char *name, char out[PATH_MAX]) {
   snprintf(out, PATH_MAX, "%s/quarantine/%s-%lld", v->root, flat, (long long)time(NULL));
 }
 
-/* Keeps wrong bytes, and notes their name. They are deleted from the bucket: it holds no other copy unless it has versions. */
+/* Keeps wrong bytes, and notes their name. They are deleted from the bucket: it holds no other copy unless it has
+ * versions. */
 static void set_damaged(vault *v, const char *name, const char *from) {
   char aside[PATH_MAX];
   name_aside(v, name, aside);

@@ -174,6 +174,28 @@ test('while S3 is away, requests get 503, the cache is served and jobs wait', as
   await until(async () => (await d.get(`/v1/jobs/${job.json.id}`)).json.state === 'succeeded', 'the job ends');
 });
 
+test('assets=redirect sends the caller to S3', async (t) => {
+  const { d } = await stored(t, 'redirect', '--assets', 'redirect');
+  const shapes = [];
+  for (const name of ['dog', 'giraffe']) shapes.push({ mesh: (await d.mesh(path.join(samples, `${name}.obj`))).id });
+  const { id } = await d.made('/v1/supermeshes', { shapes });
+  const asset = new URL(`/v1/supermeshes/${id}/asset.glb`, d.url);
+  const reply = await fetch(asset, { redirect: 'manual' });
+  assert.equal(reply.status, 307);
+  const to = reply.headers.get('location');
+  assert.ok(to.startsWith(`${server}/objects/redirect/asset/`));
+  const bytes = await fetch(to);
+  assert.equal(bytes.status, 200);
+  assert.equal(bytes.headers.get('content-type'), 'model/gltf-binary');
+  assert.equal(
+    Buffer.from(await bytes.arrayBuffer())
+      .subarray(0, 4)
+      .toString(),
+    'glTF',
+  );
+  assert.equal((await fetch(to.replace(/Signature=../, 'Signature=00'))).status, 403);
+});
+
 test('the cache stays within its bound', async (t) => {
   const { d } = await stored(t, 'bound', '--cache-bytes', '1M');
   const most = 1 << 20;
@@ -182,7 +204,8 @@ test('the cache stays within its bound', async (t) => {
   }
   let bytes = 0;
   for (const entry of await readdir(path.join(d.data, 'cache'), { recursive: true, withFileTypes: true })) {
-    if (entry.isFile()) bytes += (await import('node:fs')).statSync(path.join(entry.parentPath ?? entry.path, entry.name)).size;
+    if (entry.isFile())
+      bytes += (await import('node:fs')).statSync(path.join(entry.parentPath ?? entry.path, entry.name)).size;
   }
   assert.ok(bytes > 300_000 && bytes <= most, `${bytes}`);
   assert.equal((await list(server, 'objects', 'bound/mesh/')).length, 8);

@@ -1,4 +1,5 @@
-/* Objects in S3 without a server: signatures against examples that AWS published, URLs, keys, the bound of the cache. */
+/* Objects in S3 without a server: signatures against examples that AWS published, URLs, keys, the bound of the cache.
+ */
 #include <fcntl.h>
 #include <limits.h>
 #include <setjmp.h>
@@ -25,7 +26,8 @@ static const char empty[] = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca49
 static void test_s3_examples(void **state) {
   (void)state;
   static const s3_keys keys = {.access = "AKIAIOSFODNN7EXAMPLE", .secret = "wJalrXUtnFEMI/K7MDENG/bPxRfiCYEXAMPLEKEY"};
-  static const char date[] = "20130524T000000Z", body[] = "44ce7dd67c959e0d3524ffac1771dfbba87d2b6b4b4e99e42034a8b803f8b072";
+  static const char date[] = "20130524T000000Z",
+                    body[] = "44ce7dd67c959e0d3524ffac1771dfbba87d2b6b4b4e99e42034a8b803f8b072";
   static const struct {
     s3_canonical request;
     const char *signature;
@@ -80,11 +82,11 @@ static void test_presigned(void **state) {
   char query[2048];
   assert_true(s3_presign(&keys, "us-east-1", "examplebucket.s3.amazonaws.com", "/test.txt", "20130524T000000Z", 86400,
                          "", query, sizeof query));
-  assert_string_equal(
-      query,
-      "X-Amz-Algorithm=AWS4-HMAC-SHA256&X-Amz-Credential=AKIAIOSFODNN7EXAMPLE%2F20130524%2Fus-east-1%2Fs3%2Faws4_request"
-      "&X-Amz-Date=20130524T000000Z&X-Amz-Expires=86400&X-Amz-SignedHeaders=host"
-      "&X-Amz-Signature=aeeed9bbccd4d02ee5c0109b86d86835f995330da4c265957d157751f604d404");
+  assert_string_equal(query,
+                      "X-Amz-Algorithm=AWS4-HMAC-SHA256&X-Amz-Credential=AKIAIOSFODNN7EXAMPLE%2F20130524%2Fus-east-1%"
+                      "2Fs3%2Faws4_request"
+                      "&X-Amz-Date=20130524T000000Z&X-Amz-Expires=86400&X-Amz-SignedHeaders=host"
+                      "&X-Amz-Signature=aeeed9bbccd4d02ee5c0109b86d86835f995330da4c265957d157751f604d404");
   char small[100];
   assert_false(s3_presign(&keys, "us-east-1", "h", "/test.txt", "20130524T000000Z", 1, "", small, sizeof small));
   s3_date(1369353600, small);
@@ -100,7 +102,8 @@ static void test_urls(void **state) {
   assert_string_equal(at.base, "/");
   assert_string_equal(at.prefix, "");
   assert_string_equal(at.scheme, "https");
-  assert_true(s3_url_read("s3://things/a/b/?region=eu-1&path_style=1&endpoint=https%3A%2F%2Fs3.example.org:443/", &at, &why));
+  assert_true(
+      s3_url_read("s3://things/a/b/?region=eu-1&path_style=1&endpoint=https%3A%2F%2Fs3.example.org:443/", &at, &why));
   assert_string_equal(at.host, "s3.example.org");
   assert_string_equal(at.base, "/things/");
   assert_string_equal(at.prefix, "a/b/");
