@@ -11,6 +11,7 @@
 
 #include "log.h"
 #include "net/networks.h"
+#include "net/s3_url.h"
 #include "orbmorph/status.h"
 
 typedef struct entry {
@@ -411,15 +412,6 @@ static int is_objects(const char *text) {
     complain("objects must be files, or a URL s3://BUCKET[/PREFIX]?endpoint=URL&region=R; %s", why);
   }
   return fine;
-}
-
-store_place config_stores(const config *options) {
-  return (store_place){.data = options->data,
-                       .catalogue = config_catalogue(options),
-                       .bucket = {.url = strcmp(options->objects, "files") == 0 ? NULL : options->objects,
-                                  .keys = options->s3_keys,
-                                  .authorities = options->tls_authorities},
-                       .cache = (uint64_t)options->cache_bytes};
 }
 
 const char *config_catalogue(const config *options) {

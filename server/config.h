@@ -6,8 +6,6 @@
 #include <limits.h>
 #include <stdint.h>
 
-#include "store/place.h"
-
 typedef struct config {
   char listen[256]; /* ADDR:PORT or unix:PATH */
   char data[PATH_MAX / 2];
@@ -53,8 +51,6 @@ int config_number(const char *text, int64_t *out);
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken));
 /* The URL of the catalogue; NULL: it is in the data folder. */
 const char *config_catalogue(const config *options);
-/* Where rows and objects are. Points into options. */
-store_place config_stores(const config *options);
 config_action config_read(config *out, int argc, char **argv);
 
 #endif

@@ -353,7 +353,7 @@ static int start_scrub(server *srv) {
 }
 
 static int open_stores(server *srv) {
-  const store_place place = config_stores(srv->options);
+  const store_place place = store_place_of(srv->options);
   store_result result = stores_open(&place, &srv->store, &srv->cat);
   srv->unfit = result == STORE_UNFIT;
   return result == STORE_OK;

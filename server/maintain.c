@@ -84,7 +84,7 @@ static void each_object(void *user, object_kind kind, const char *id, uint64_t s
 }
 
 static int open_both(const config *options, tally *t) {
-  const store_place place = config_stores(options);
+  const store_place place = store_place_of(options);
   store_result result = stores_open(&place, &t->store, &t->cat);
   t->unfit = result == STORE_UNFIT;
   return result == STORE_OK;

@@ -14,7 +14,7 @@ enum { BUCKET_PART = 64 << 20, BUCKET_OWNER = 64, BUCKET_LINK = 8192 };
 typedef struct object_bucket object_bucket;
 
 typedef struct bucket_options {
-  const char *url;         /* see store/s3_url.h */
+  const char *url;         /* see net/s3_url.h */
   const char *keys;        /* a file of keys, as the programs of AWS have it; "": the environment */
   const char *authorities; /* PEM file; "": those of the system */
   uint64_t part;           /* objects that are larger are sent in parts of this size; 0: BUCKET_PART */

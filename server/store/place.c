@@ -187,6 +187,15 @@ static store_result open_bucket(const store_place *p, const char *path, const ch
   return objects_open_bucket(p->data, b, p->cache, store);
 }
 
+store_place store_place_of(const config *options) {
+  return (store_place){.data = options->data,
+                       .catalogue = config_catalogue(options),
+                       .bucket = {.url = strcmp(options->objects, "files") == 0 ? NULL : options->objects,
+                                  .keys = options->s3_keys,
+                                  .authorities = options->tls_authorities},
+                       .cache = (uint64_t)options->cache_bytes};
+}
+
 store_result stores_open(const store_place *place, objects **store, catalogue **cat) {
   char path[PATH_MAX], mark[MARK];
   path_in(place->data, "objects.s3", path);

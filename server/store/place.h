@@ -7,6 +7,7 @@
 #ifndef ORB_STORE_PLACE_H
 #define ORB_STORE_PLACE_H
 
+#include "config.h"
 #include "store/catalogue.h"
 #include "store/objects.h"
 
@@ -22,6 +23,8 @@ typedef struct store_place {
   uint64_t cache;        /* bytes of copies of objects in a object_bucket */
 } store_place;
 
+/* What the options say; points into them. */
+store_place store_place_of(const config *options);
 /* Opens both. STORE_UNFIT: as above, also for objects that belong to another catalogue, a bucket that does not exist or
  * refuses. On failure the caller closes what was opened. */
 store_result stores_open(const store_place *place, objects **store, catalogue **cat);

@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
+#include "net/s3_url.h"
 #include "store/s3_sign.h"
-#include "store/s3_url.h"
 
 enum { S3_WHY = 200, S3_TAG = 80 };
 

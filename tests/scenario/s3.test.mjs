@@ -177,7 +177,7 @@ test('while S3 is away, requests get 503, the cache is served and jobs wait', as
 test('assets=redirect sends the caller to S3', async (t) => {
   const { d } = await stored(t, 'redirect', '--assets', 'redirect');
   const shapes = [];
-  for (const name of ['dog', 'giraffe']) shapes.push({ mesh: (await d.mesh(path.join(samples, `${name}.obj`))).id });
+  for (const name of ['dog.obj', 'giraffe.off']) shapes.push({ mesh: (await d.mesh(path.join(samples, name))).id });
   const { id } = await d.made('/v1/supermeshes', { shapes });
   const asset = new URL(`/v1/supermeshes/${id}/asset.glb`, d.url);
   const reply = await fetch(asset, { redirect: 'manual' });

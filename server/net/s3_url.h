@@ -3,8 +3,8 @@
  * All names that a request then carries consist of characters that S3's signatures encode as themselves, so no two ways
  * to encode a path can differ: that is what a bucket and a prefix may consist of.
  */
-#ifndef ORB_STORE_S3_URL_H
-#define ORB_STORE_S3_URL_H
+#ifndef ORB_NET_S3_URL_H
+#define ORB_NET_S3_URL_H
 
 enum { S3_NAME = 64, S3_PREFIX = 256, S3_HOST = 320 };
 

@@ -1,4 +1,4 @@
-#include "store/s3_url.h"
+#include "net/s3_url.h"
 
 #include <ctype.h>
 #include <stdio.h>
