@@ -174,8 +174,25 @@ static int refuse_url(void) {
   return 2;
 }
 
+/* Objects in a bucket: its versions are their backup. */
+static int refuse_bucket(void) {
+  fputs(
+      "orbmorphd: backup and restore are for objects in files. Keep versions in the bucket, and copy the catalogue "
+      "with "
+      "sqlite3 DATA/catalogue.sqlite '.backup FILE'; see docs/cluster.md\n",
+      stderr);
+  return 2;
+}
+
+static int is_in_bucket(const config *options) {
+  return strcmp(options->objects, "files") != 0 || has(options->data, "objects.s3");
+}
+
 static int run_backup(const char *folder, const config *options) {
   umask(077);
+  if (is_in_bucket(options)) {
+    return refuse_bucket();
+  }
   if (config_catalogue(options)) {
     return refuse_url();
   }
@@ -230,6 +247,9 @@ static int put_back(const char *folder, const char *data) {
 
 static int run_restore(const char *folder, const config *options) {
   umask(077);
+  if (is_in_bucket(options)) {
+    return refuse_bucket();
+  }
   if (config_catalogue(options)) {
     return refuse_url();
   }

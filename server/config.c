@@ -11,6 +11,7 @@
 
 #include "log.h"
 #include "net/networks.h"
+#include "net/s3_url.h"
 #include "orbmorph/status.h"
 
 typedef struct entry {
@@ -32,7 +33,18 @@ static const entry table[] = {
     {"catalogue", TEXT(catalogue), "sqlite",
      "where rows are stored; sqlite: in the data folder; postgresql://…: in a database of PostgreSQL 15 or later, "
      "which "
-     "one daemon uses at a time; objects stay in the data folder"},
+     "one daemon uses at a time"},
+    {"objects", TEXT(objects), "files",
+     "where meshes and results are stored; files: in the data folder; s3://BUCKET[/PREFIX]?endpoint=URL&region=R: in a "
+     "bucket of S3, with copies in the data folder"},
+    {"s3-keys", TEXT(s3_keys), "",
+     "file with aws_access_key_id and aws_secret_access_key; without it, those of the environment (AWS_ACCESS_KEY_ID, "
+     "AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN)"},
+    {"cache-bytes", NUMBER(cache_bytes, 1 << 20, INT64_C(1) << 50), "10G",
+     "bytes of objects in S3 to keep as copies in the data folder, most recently used ones first"},
+    {"assets", TEXT(assets), "stream",
+     "stream: the daemon sends assets; redirect: with objects in S3, it answers 307 with a URL of S3 that is valid for "
+     "15 minutes"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
     {"worker-nice", NUMBER(worker_nice, 0, 19), "5",
@@ -392,6 +404,16 @@ static int is_catalogue(const char *text) {
   return fine;
 }
 
+static int is_objects(const char *text) {
+  s3_place place;
+  const char *why;
+  int fine = strcmp(text, "files") == 0 || s3_url_read(text, &place, &why);
+  if (!fine) {
+    complain("objects must be files, or a URL s3://BUCKET[/PREFIX]?endpoint=URL&region=R; %s", why);
+  }
+  return fine;
+}
+
 const char *config_catalogue(const config *options) {
   return strcmp(options->catalogue, "sqlite") == 0 ? NULL : options->catalogue;
 }
@@ -430,6 +452,7 @@ static int consistent(config *out) {
                            *const isolate[] = {"on", "off", "strict", NULL},
                            *const levels[] = {"debug", "info", "warn", "error", NULL},
                            *const formats[] = {"json", "text", NULL};
+  static const char *const assets[] = {"stream", "redirect", NULL};
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   if (out->workers == 0) {
     out->workers = cores > 0 ? (cores < 256 ? cores : 256) : 1;
@@ -441,8 +464,9 @@ static int consistent(config *out) {
     complain("tls-certificate and tls-key must both be set, or neither");
     return 0;
   }
-  return is_address(out->listen) && is_catalogue(out->catalogue) && is_mode(out->socket_mode) &&
-         is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
+  return is_address(out->listen) && is_catalogue(out->catalogue) && is_objects(out->objects) &&
+         is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
+         is_one_of("assets", out->assets, assets) && is_readable("s3-keys", out->s3_keys) &&
          is_one_of("isolate", out->isolate, isolate) && is_one_of("log-level", out->log_level, levels) &&
          is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) && are_hosts(out->hosts) &&
          is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key) &&

@@ -10,6 +10,9 @@ typedef struct config {
   char listen[256]; /* ADDR:PORT or unix:PATH */
   char data[PATH_MAX / 2];
   char catalogue[1024]; /* sqlite, or the URL of a database in PostgreSQL */
+  char objects[1024];   /* files, or the URL of a bucket in S3 */
+  char s3_keys[PATH_MAX / 2];
+  char assets[16]; /* stream, redirect */
   char file[PATH_MAX / 2];
   char hosts[512]; /* names in Host, comma-separated, or * */
   char cors[512];  /* origins, comma-separated, or * */
@@ -24,7 +27,7 @@ typedef struct config {
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, check_seconds, disk_reserve, drain_seconds, derived_bytes, quota_derived, keep_jobs;
-  int64_t lost_days, scrub_rate, scrub_seconds;
+  int64_t cache_bytes, lost_days, scrub_rate, scrub_seconds;
   int64_t webhook_retry_seconds, fetch_seconds;
 } config;
 

@@ -352,8 +352,9 @@ static int start_scrub(server *srv) {
   return srv->scrub || o->scrub_rate == 0;
 }
 
-static int open_catalogue(server *srv) {
-  store_result result = catalogue_open_at(srv->options->data, config_catalogue(srv->options), &srv->cat);
+static int open_stores(server *srv) {
+  const store_place place = store_place_of(srv->options);
+  store_result result = stores_open(&place, &srv->store, &srv->cat);
   srv->unfit = result == STORE_UNFIT;
   return result == STORE_OK;
 }
@@ -390,8 +391,8 @@ static int start(server *srv, worker_pool **workers) {
   }
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  return listens && srv->memory && objects_open(o->data, &srv->store) == STORE_OK && open_catalogue(srv) &&
-         check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
+  return listens && srv->memory && open_stores(srv) && check_catalogue(srv) &&
+         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) &&
          (srv->io = tasks_start((int)o->io_threads, NULL)) &&

@@ -16,7 +16,7 @@ typedef struct tally {
   catalogue *cat;
   objects *store;
   long objects, rows, wrong, orphans;
-  int remove_orphans;
+  int remove_orphans, unfit;
 } tally;
 
 static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
@@ -84,8 +84,10 @@ static void each_object(void *user, object_kind kind, const char *id, uint64_t s
 }
 
 static int open_both(const config *options, tally *t) {
-  return objects_open(options->data, &t->store) == STORE_OK &&
-         catalogue_open_at(options->data, config_catalogue(options), &t->cat) == STORE_OK;
+  const store_place place = store_place_of(options);
+  store_result result = stores_open(&place, &t->store, &t->cat);
+  t->unfit = result == STORE_UNFIT;
+  return result == STORE_OK;
 }
 
 static void close_both(tally *t) {
@@ -97,7 +99,7 @@ int maintain_check(const config *options) {
   tally t = {0};
   if (!open_both(options, &t)) {
     close_both(&t);
-    return 1;
+    return t.unfit ? CONFIG_UNFIT : 1;
   }
   if (!catalogue_integrity(t.cat)) {
     puts("the catalogue fails SQLite's integrity check");
@@ -167,5 +169,5 @@ int maintain_gc(const config *options) {
     }
   }
   close_both(&t);
-  return fine ? 0 : 1;
+  return t.unfit ? CONFIG_UNFIT : !fine;
 }

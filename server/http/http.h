@@ -119,6 +119,7 @@ struct request {
   int64_t expires;   /* of the signature, Unix time in seconds */
   int64_t retry_s;   /* for Retry-After; 0: the usual */
   int is_unverified; /* the file to send could not be compared with its hash, or not be moved away */
+  int is_away;       /* because S3 does not answer */
   int begun;         /* the headers have arrived */
   int has_body, head;
   int closes; /* the connection closes after this response */

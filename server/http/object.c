@@ -122,6 +122,7 @@ int object_is_ready(request *r, object_kind kind, const char *sha) {
     }
     store_result result = verify_once(r->srv->store, kind, r->id, sha);
     r->is_unverified = result != STORE_OK && result != STORE_NOT_FOUND;
+    r->is_away = result == STORE_AWAY;
   }
   return 1;
 }
@@ -133,7 +134,7 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
       compresses = kind == OBJECT_ASSET || kind == OBJECT_QUANTIZED || kind == OBJECT_SPHERE || kind == OBJECT_SPHERES;
   uint64_t size, first = 0, length;
   if (r->is_unverified) {
-    reply_store(r, STORE_ERROR);
+    reply_store(r, r->is_away ? STORE_AWAY : STORE_ERROR);
     return 1;
   }
   stpcpy(stpncpy(stpcpy(etag, "\""), sha, 32), "\"");
@@ -207,14 +208,30 @@ static const char *disposition_of(const cached *entry) {
   return known ? known : "inline";
 }
 
+enum { LINK_SECONDS = 900 }; /* a client that got the URL has begun within that time */
+
+/* Sends the client to S3. 0: it is to get the bytes. */
+static int reply_redirect(request *r, object_kind kind) {
+  char url[BUCKET_LINK];
+  if (strcmp(r->srv->options->assets, "redirect") != 0 || r->head ||
+      !objects_link(r->srv->store, kind, r->id, LINK_SECONDS, "response-content-type=model%2Fgltf-binary", url)) {
+    return 0;
+  }
+  reply_empty(r, 307);
+  reply_header(r, "Location", url);
+  reply_header(r, "Cache-Control", "no-store");
+  return 1;
+}
+
 int reply_stored_asset(request *r, const cached *entry) {
   char link[128];
   int stored = r->profile - 1; /* −1: the asset itself */
   const char *sha = stored < 0 ? entry->row.sha : entry->row.profiles[stored];
   memcpy(r->id, entry->row.id, sizeof r->id);
   object_kind kind = stored < 0 ? OBJECT_ASSET : object_of_profile(stored);
-  int done = sha[0] && object_is_ready(r, kind, sha) &&
-             reply_object(r, kind, r->id, sha, "model/gltf-binary", disposition_of(entry));
+  int done = sha[0] && reply_redirect(r, kind);
+  done = done || (sha[0] && object_is_ready(r, kind, sha) &&
+                  reply_object(r, kind, r->id, sha, "model/gltf-binary", disposition_of(entry)));
   if (done && r->route->id == ROUTE_MORPH && r->status < 400) {
     stpcpy(stpcpy(stpcpy(link, "</v1/supermeshes/"), r->id), ">; rel=\"describedby\"");
     reply_header(r, "Link", link);

@@ -178,6 +178,8 @@ void reply_store(request *r, store_result result) {
     reply_refuse(r, "not-found", "Nothing has this id; it may have been deleted.");
   } else if (result == STORE_FULL) {
     reply_refuse(r, "storage-full", "The server's disk is full; nothing was stored. Free some space and try again.");
+  } else if (result == STORE_AWAY) {
+    reply_refuse(r, "unavailable", "The store of objects (S3) does not answer; nothing is lost. Try again soon.");
   } else if (objects_is_read_only(r->srv->store)) {
     reply_refuse(r, "read-only",
                  "The server's data folder is on a read-only file system; nothing was stored. Stored results are still "

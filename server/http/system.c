@@ -150,6 +150,10 @@ static enum MHD_Result ready(request *r) {
     reply_refuse(r, "unavailable", "The catalogue is damaged: stop the daemon and restore a backup.");
     return MHD_YES;
   }
+  if (objects_are_away(srv->store)) {
+    reply_refuse(r, "unavailable", "The store of objects (S3) does not answer; the server's log says why.");
+    return MHD_YES;
+  }
   api_text json = {0};
   api_json_open(&json, '{');
   api_json_member_string(&json, "status", "ready");

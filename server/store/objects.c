@@ -14,11 +14,13 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "api/ids.h"
 #include "faults.h"
 #include "hash.h"
 #include "log.h"
 #include "metrics.h"
 #include "store/marks.h"
+#include "store/vault.h"
 
 static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset",   "places",
                                                   "spheres", "quantized", "meshopt", "alignment"};
@@ -39,6 +41,7 @@ struct objects {
   marks *verified;
   char root[PATH_MAX - 256];
   objects_remote remote; /* publish NULL: the store has files */
+  vault *vault;          /* NULL: the objects are files */
   void (*heal)(void *user, object_kind kind, const char *id);
   void *heal_user;
 };
@@ -47,6 +50,24 @@ static store_result failed(const char *what, const char *path) {
   int code = errno;
   log_error("%s %s: %s", what, path, strerror(code));
   return code == ENOSPC || code == EDQUOT || code == EFBIG ? STORE_FULL : STORE_ERROR;
+}
+
+static void name_of(object_kind kind, const char *id, char out[VAULT_NAME]) {
+  snprintf(out, VAULT_NAME, "%s/%.2s/%.80s", folders[kind], id, id);
+}
+
+/* 0: no name of an object. */
+static int read_name(const char *name, object_kind *kind, const char **id) {
+  size_t folder = strcspn(name, "/");
+  const char *slash = strrchr(name, '/');
+  for (int k = 0; slash && k < OBJECT_KINDS; k++) {
+    if (strlen(folders[k]) == folder && strncmp(folders[k], name, folder) == 0) {
+      *kind = (object_kind)k;
+      *id = slash + 1;
+      return strlen(*id) == API_ID_SIZE - 1 && (*id)[strspn(*id, "0123456789abcdef")] == 0;
+    }
+  }
+  return 0;
 }
 
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]) {
@@ -94,14 +115,18 @@ store_result objects_make_folder(const objects *store, object_kind kind, const c
   return status == STORE_OK ? sync_folder(path) : status; /* another thread may have made it and not synced it yet */
 }
 
+static store_result make_top(const objects *store) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/tmp", store->root);
+  store_result status = make_folder(store->root);
+  return status == STORE_OK ? make_folder(path) : status;
+}
+
 static store_result make_folders(const objects *store) {
   char path[PATH_MAX];
-  store_result status = STORE_OK;
-  static const char *const top[] = {"", "/tmp", "/objects"};
-  for (size_t i = 0; i < 3 && status == STORE_OK; i++) {
-    snprintf(path, sizeof path, "%s%s", store->root, top[i]);
-    status = make_folder(path);
-  }
+  snprintf(path, sizeof path, "%s/objects", store->root);
+  store_result status = make_top(store);
+  status = status == STORE_OK ? make_folder(path) : status;
   for (int kind = 0; kind < OBJECT_KINDS && status == STORE_OK; kind++) {
     snprintf(path, sizeof path, "%s/objects/%s", store->root, folders[kind]);
     status = make_folder(path);
@@ -141,6 +166,12 @@ int objects_backup_lock(const char *data) {
   return fd;
 }
 
+static void sweep_temporary(const objects *store) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/tmp", store->root);
+  sweep(path);
+}
+
 store_result objects_open(const char *data, objects **out) {
   objects *store = create(data);
   store_result status = store ? make_folders(store) : STORE_ERROR;
@@ -151,9 +182,23 @@ store_result objects_open(const char *data, objects **out) {
     objects_close(store);
     return status;
   }
-  char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/tmp", store->root);
-  sweep(path);
+  sweep_temporary(store);
+  *out = store;
+  return STORE_OK;
+}
+
+store_result objects_open_bucket(const char *data, object_bucket *b, uint64_t most, objects **out) {
+  objects *store = create(data);
+  store_result status = store ? make_top(store) : STORE_ERROR;
+  if (status == STORE_OK && !(store->vault = vault_open(data, b, most))) {
+    status = STORE_ERROR;
+  }
+  if (status != STORE_OK) {
+    bucket_close(b);
+    objects_close(store);
+    return status;
+  }
+  sweep_temporary(store);
   *out = store;
   return STORE_OK;
 }
@@ -184,6 +229,7 @@ void objects_close(objects *store) {
   if (store->backup_lock >= 0) {
     close(store->backup_lock);
   }
+  vault_close(store->vault);
   marks_destroy(store->verified);
   pthread_mutex_destroy(&store->deleting);
   pthread_rwlock_destroy(&store->publishing);
@@ -256,6 +302,15 @@ store_result objects_publish(objects *store, object_temp *temp, object_kind kind
     objects_abandon(temp);
     return status;
   }
+  if (store->vault) {
+    char name[VAULT_NAME];
+    name_of(kind, id, name);
+    temp_path(temp, from);
+    store_result status = vault_publish(store->vault, name, temp->fd, from);
+    close(temp->fd);
+    temp->fd = -1;
+    return status;
+  }
   objects_path(store, kind, id, path);
   FAULT_POINT("publish-written");
   if (fsync(temp->fd) != 0) {
@@ -304,6 +359,11 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
   if (store->remote.read) {
     return store->remote.read(store->remote.user, kind, id, fd, size);
   }
+  if (store->vault) {
+    char name[VAULT_NAME];
+    name_of(kind, id, name);
+    return vault_read(store->vault, name, fd, size);
+  }
   objects_path(store, kind, id, path);
   *fd = open(path, O_RDONLY | O_CLOEXEC);
   if (*fd < 0) {
@@ -316,6 +376,38 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
   }
   *size = (uint64_t)info.st_size;
   return STORE_OK;
+}
+
+store_result objects_look(const objects *store, object_kind kind, const char *id) {
+  char path[PATH_MAX];
+  if (store->vault) {
+    char name[VAULT_NAME];
+    name_of(kind, id, name);
+    return vault_look(store->vault, name);
+  }
+  objects_path(store, kind, id, path);
+  return access(path, F_OK) == 0 ? STORE_OK : errno == ENOENT ? STORE_NOT_FOUND : failed("look at", path);
+}
+
+int objects_is_near(const objects *store, object_kind kind, const char *id) {
+  char name[VAULT_NAME];
+  name_of(kind, id, name);
+  return !store->vault || vault_copy(store->vault, name);
+}
+
+int objects_are_remote(const objects *store) {
+  return store->vault != NULL;
+}
+
+int objects_are_away(const objects *store) {
+  return store->vault && vault_is_away(store->vault);
+}
+
+int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
+                 char out[BUCKET_LINK]) {
+  char name[VAULT_NAME];
+  name_of(kind, id, name);
+  return store->vault && vault_link(store->vault, name, seconds, more, out);
 }
 
 store_result objects_load(const objects *store, object_kind kind, const char *id, unsigned char **bytes, size_t *size) {
@@ -360,6 +452,11 @@ static void end_deleting(const objects *store) {
 
 static store_result unlink_object(const objects *store, object_kind kind, const char *id) {
   char path[PATH_MAX];
+  if (store->vault) {
+    char name[VAULT_NAME];
+    name_of(kind, id, name);
+    return vault_delete(store->vault, name);
+  }
   objects_path(store, kind, id, path);
   FAULT_POINT("before-unlink");
   return unlink(path) == 0 || errno == ENOENT ? STORE_OK : failed("unlink", path);
@@ -368,10 +465,13 @@ static store_result unlink_object(const objects *store, object_kind kind, const 
 store_result objects_delete(objects *store, object_kind kind, const char *id) {
   store_result result = STORE_OK;
   pthread_mutex_lock(&store->deleting);
-  if (begin_deleting(store)) {
+  int deletes = begin_deleting(store);
+  if (deletes) {
     result = unlink_object(store, kind, id);
     end_deleting(store);
-  } else {
+  }
+  if (!deletes || result == STORE_AWAY) {
+    result = STORE_OK;
     held_object *one = calloc(1, sizeof *one); /* without memory the file stays until --gc */
     if (one) {
       *one = (held_object){.next = store->held, .kind = kind};
@@ -400,10 +500,23 @@ int objects_hold_backups(objects *store) {
   return store->holds_backups;
 }
 
+/* Makes again what vault_read() found damaged, perhaps in a thread that held the store. */
+static void heal_damaged(objects *store) {
+  char name[VAULT_NAME];
+  while (store->vault && vault_take_damaged(store->vault, name)) {
+    object_kind kind;
+    const char *id;
+    metrics_quarantined();
+    if (read_name(name, &kind, &id) && store->heal) {
+      store->heal(store->heal_user, kind, id);
+    }
+  }
+}
+
 static held_object *take_held(objects *store) {
   held_object *one = NULL;
   pthread_mutex_lock(&store->deleting);
-  if (store->held && begin_deleting(store)) {
+  if (store->held && !objects_are_away(store) && begin_deleting(store)) {
     one = store->held;
     store->held = one->next;
     end_deleting(store);
@@ -413,6 +526,7 @@ static held_object *take_held(objects *store) {
 }
 
 void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user) {
+  heal_damaged(store);
   for (held_object *one; (one = take_held(store)); free(one)) {
     objects_exclude(store);
     if (!is_named(user, one->kind, one->id)) {
@@ -422,18 +536,24 @@ void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind
   }
 }
 
-static uint64_t hash_of(object_kind kind, const char *id) {
-  char text[80];
-  int n = snprintf(text, sizeof text, "%d %s", (int)kind, id);
+/* A copy of an object in S3 that was fetched again has another hash: the mark is one of the copy. */
+static uint64_t hash_of(const objects *store, object_kind kind, const char *id) {
+  char text[104];
+  int n = snprintf(text, sizeof text, "%d %.80s", (int)kind, id);
+  if (store->vault) {
+    char name[VAULT_NAME];
+    name_of(kind, id, name);
+    n += snprintf(text + n, sizeof text - (size_t)n, " %llx", (unsigned long long)vault_copy(store->vault, name));
+  }
   return keyed_hash(text, n < (int)sizeof text ? (size_t)n : sizeof text - 1);
 }
 
 void objects_mark(objects *store, object_kind kind, const char *id) {
-  marks_add(store->verified, hash_of(kind, id));
+  marks_add(store->verified, hash_of(store, kind, id));
 }
 
 int objects_is_marked(const objects *store, object_kind kind, const char *id) {
-  return marks_have(store->verified, hash_of(kind, id));
+  return objects_is_near(store, kind, id) && marks_have(store->verified, hash_of(store, kind, id));
 }
 
 /* Moves the file aside if it still has the name: it may have been replaced, or moved by another thread, since it was
@@ -466,7 +586,12 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
   int moved = 0;
   size_t n = strlen(aside);
   snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", folders[kind], id, (long long)time(NULL));
-  if (result == STORE_OK) {
+  if (result == STORE_OK && store->vault) {
+    char name[VAULT_NAME];
+    name_of(kind, id, name);
+    result = vault_quarantine(store->vault, name, fd, aside);
+    moved = result == STORE_NOT_FOUND;
+  } else if (result == STORE_OK) {
     objects_exclude(store);
     result = move_aside(path, aside, fd, &moved);
     objects_let_go(store);
@@ -489,7 +614,11 @@ store_result objects_set_aside(objects *store, object_kind kind, const char *id)
   store_result result = make_folder(aside);
   size_t n = strlen(aside);
   snprintf(aside + n, sizeof aside - n, "/%s-%s", folders[kind], id);
-  if (result == STORE_OK && rename(path, aside) != 0) {
+  if (result == STORE_OK && store->vault) {
+    char name[VAULT_NAME];
+    name_of(kind, id, name);
+    result = vault_set_aside(store->vault, name, aside);
+  } else if (result == STORE_OK && rename(path, aside) != 0) {
     result = failed("rename to", aside);
   }
   if (result == STORE_OK) {
@@ -529,9 +658,27 @@ uint64_t objects_free_bytes(const objects *store) {
   return statvfs(store->root, &info) == 0 ? (uint64_t)info.f_bavail * info.f_frsize : UINT64_MAX;
 }
 
+/* Gives a name of the vault as kind and id. */
+typedef struct named_visit {
+  void (*each)(void *user, object_kind kind, const char *id, uint64_t size);
+  void *user;
+} named_visit;
+
+static void visit(void *user, const char *name, uint64_t size) {
+  const named_visit *v = user;
+  object_kind kind;
+  const char *id;
+  if (read_name(name, &kind, &id)) {
+    v->each(v->user, kind, id, size);
+  }
+}
+
 store_result objects_each(const objects *store,
                           void (*each)(void *user, object_kind kind, const char *id, uint64_t size), void *user) {
   store_result result = STORE_OK;
+  if (store->vault) {
+    return vault_each(store->vault, visit, &(named_visit){each, user});
+  }
   for (int kind = 0; kind < OBJECT_KINDS; kind++) {
     for (int shard = 0; shard < 256; shard++) {
       char path[PATH_MAX];

@@ -1,9 +1,13 @@
-/* Objects: files named by an id, written once and never changed.
+/* Objects: bytes named by an id, written once and never changed: in files of the data folder, or in a bucket of S3.
  *
- * Contract. A writer fills a temporary file and publishes it: fsync of the file, rename to its final path, fsync of the
- * folder. So an object exists completely or not at all, also after a crash. Temporary files live in one folder of the
- * same file system; objects_open() deletes those of a dead process. Any thread may call any function. Publishing the
- * same id twice is allowed, because equal ids have equal bytes.
+ * Contract of files. A writer fills a temporary file and publishes it: fsync of the file, rename to its final path,
+ * fsync of the folder. So an object exists completely or not at all, also after a crash. Temporary files live in one
+ * folder of the same file system; objects_open() deletes those of a dead process. Any thread may call any function.
+ * Publishing the same id twice is allowed, because equal ids have equal bytes.
+ *
+ * In a bucket, an object has its final name from the start, and S3 shows it completely or not at all. The folder
+ * `cache` of the data folder then has verified copies of the objects that were used last, so a descriptor is always one
+ * of a file.
  */
 #ifndef ORB_STORE_OBJECTS_H
 #define ORB_STORE_OBJECTS_H
@@ -11,6 +15,9 @@
 #include <limits.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include "store/bucket.h"
+#include "store/result.h"
 
 typedef enum object_kind {
   OBJECT_MESH,
@@ -24,20 +31,12 @@ typedef enum object_kind {
   OBJECT_KINDS
 } object_kind;
 
-/* Results of all functions of the store. */
-typedef enum store_result {
-  STORE_OK = 0,
-  STORE_NOT_FOUND,
-  STORE_CONFLICT, /* a condition no longer holds */
-  STORE_FULL,     /* no space left */
-  STORE_ERROR,    /* input/output error; logged */
-  STORE_UNFIT,    /* only of opening: the configuration is wrong, see store/place.h; logged */
-} store_result;
-
 typedef struct objects objects;
 
 /* Creates the folders under data and deletes temporary files. */
 store_result objects_open(const char *data, objects **out);
+/* The same for objects in a bucket, which belongs to the store from now on. most: bytes of the folder `cache`. */
+store_result objects_open_bucket(const char *data, object_bucket *b, uint64_t most, objects **out);
 /* For reading objects only; changes nothing. */
 store_result objects_open_read_only(const char *data, objects **out);
 
@@ -79,15 +78,26 @@ void objects_let_go(objects *store);
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size);
 /* Reads a whole object into memory allocated with malloc(). */
 store_result objects_load(const objects *store, object_kind kind, const char *id, unsigned char **bytes, size_t *size);
+/* Whether an object is there, without reading it. */
+store_result objects_look(const objects *store, object_kind kind, const char *id);
+/* Whether reading an object asks no other machine now. */
+int objects_is_near(const objects *store, object_kind kind, const char *id);
+/* Whether objects are in a bucket, and whether that does not answer. */
+int objects_are_remote(const objects *store);
+int objects_are_away(const objects *store);
+/* A URL from which anyone may read an object for so many seconds; more: see s3_presign(). 0: there is none. */
+int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
+                 char out[BUCKET_LINK]);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
 /* Makes the folder of that file, if it is not there. */
 store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
-/* Deletes an object that no row names. While a backup runs, the file stays until objects_delete_held(). */
+/* Deletes an object that no row names. While a backup runs, or S3 is away, it stays until objects_delete_held(). */
 store_result objects_delete(objects *store, object_kind kind, const char *id);
-/* Deletes what objects_delete() left, once no backup runs. is_named: whether a row names the object again; called
- * while other threads are excluded. After a restart of the process the files stay until --gc. */
+/* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named:
+ * whether a row names the object again; called while other threads are excluded. After a restart of the process the
+ * files stay until --gc. */
 void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user);
 /* Opens the lock file of backups. A backup holds it exclusively (flock()), so the kernel releases it with the process;
  * whoever deletes an object shares it for that moment. −1 with the reason logged. */

@@ -39,7 +39,7 @@ static store_result read_mark(const char *path, char out[MARK]) {
 
 static store_result write_mark(const char *data, const char *path, const char mark[MARK]) {
   char temporary[PATH_MAX];
-  path_in(data, "catalogue.postgresql.new", temporary);
+  path_in(data, "mark.new", temporary);
   int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
   int fine = fd >= 0 && write(fd, mark, MARK - 1) == MARK - 1 && fsync(fd) == 0;
   if (fd >= 0) {
@@ -111,4 +111,105 @@ store_result catalogue_open_at(const char *data, const char *url, catalogue **ou
     return STORE_UNFIT;
   }
   return catalogue_open(data, out);
+}
+
+static void note_file(void *user, object_kind kind, const char *id, uint64_t size) {
+  (void)kind;
+  (void)id;
+  (void)size;
+  *(int *)user = 1;
+}
+
+static int has_files(const char *data) {
+  objects *files;
+  int found = 0;
+  if (objects_open_read_only(data, &files) == STORE_OK) {
+    objects_each(files, note_file, &found);
+    objects_close(files);
+  }
+  return found;
+}
+
+static int has_catalogue(const char *data) {
+  char path[PATH_MAX];
+  path_in(data, "catalogue.sqlite", path);
+  return access(path, F_OK) == 0;
+}
+
+/* What can be said before the catalogue is opened, which may create it. here: the mark of the data folder. */
+static store_result match_bucket(const store_place *p, const char *here, const char *owner) {
+  if (*here && !*owner) {
+    log_error("the bucket of --objects has none of the objects of %s: name the bucket and prefix that they are in",
+              p->data);
+    return STORE_UNFIT;
+  }
+  if ((*here && strcmp(here, owner) != 0) || (!*here && *owner && !p->catalogue && !has_catalogue(p->data))) {
+    log_error("the bucket of --objects belongs to another deployment than %s: name another bucket or prefix", p->data);
+    return STORE_UNFIT;
+  }
+  if (!*here && has_files(p->data)) {
+    log_error("the objects of %s are files: start without --objects, or name a new data folder", p->data);
+    return STORE_UNFIT;
+  }
+  return STORE_OK;
+}
+
+/* Ties the three together, when all are known. */
+static store_result claim(const store_place *p, const char *path, const char *here, const char *owner, object_bucket *b,
+                          catalogue *cat) {
+  char mark[MARK];
+  store_result result = mark_of(cat, mark);
+  if (result == STORE_OK && *owner && strcmp(owner, mark) != 0) {
+    log_error("the bucket of --objects belongs to another catalogue: name another bucket or prefix, or its catalogue");
+    return STORE_UNFIT;
+  }
+  if (result == STORE_OK && !*owner) {
+    result = bucket_claim(b, mark);
+  }
+  return result == STORE_OK && !*here ? write_mark(p->data, path, mark) : result;
+}
+
+static store_result open_bucket(const store_place *p, const char *path, const char *here, objects **store,
+                                catalogue **cat) {
+  char owner[BUCKET_OWNER + 1];
+  object_bucket *b;
+  store_result result = bucket_open(&p->bucket, owner, &b);
+  if (result != STORE_OK) {
+    return result;
+  }
+  result = match_bucket(p, here, owner);
+  result = result == STORE_OK ? catalogue_open_at(p->data, p->catalogue, cat) : result;
+  result = result == STORE_OK ? claim(p, path, here, owner, b, *cat) : result;
+  if (result != STORE_OK) {
+    bucket_close(b);
+    return result;
+  }
+  return objects_open_bucket(p->data, b, p->cache, store);
+}
+
+store_place store_place_of(const config *options) {
+  return (store_place){.data = options->data,
+                       .catalogue = config_catalogue(options),
+                       .bucket = {.url = strcmp(options->objects, "files") == 0 ? NULL : options->objects,
+                                  .keys = options->s3_keys,
+                                  .authorities = options->tls_authorities},
+                       .cache = (uint64_t)options->cache_bytes};
+}
+
+store_result stores_open(const store_place *place, objects **store, catalogue **cat) {
+  char path[PATH_MAX], mark[MARK];
+  path_in(place->data, "objects.s3", path);
+  if (read_mark(path, mark) != STORE_OK) {
+    log_error("%s cannot be read, or is damaged", path);
+    return STORE_ERROR;
+  }
+  if (place->bucket.url) {
+    return open_bucket(place, path, mark, store, cat);
+  }
+  if (*mark) {
+    log_error("the objects of %s are in S3: name their bucket with --objects", place->data);
+    return STORE_UNFIT;
+  }
+  store_result result = objects_open(place->data, store);
+  return result == STORE_OK ? catalogue_open_at(place->data, place->catalogue, cat) : result;
 }

@@ -1,14 +1,32 @@
-/* Which catalogue belongs to a data folder: its own, in SQLite, or one in PostgreSQL. The folder remembers the latter
+/* What belongs together: a data folder, its catalogue and its objects.
+ *
+ * Which catalogue belongs to a data folder: its own, in SQLite, or one in PostgreSQL. The folder remembers the latter
  * in the file catalogue.postgresql, so that its objects are never taken for those of another catalogue, which would not
- * name them. */
+ * name them. In the same way the file objects.s3 remembers that the objects are in a bucket of S3, and a bucket
+ * remembers its catalogue. */
 #ifndef ORB_STORE_PLACE_H
 #define ORB_STORE_PLACE_H
 
+#include "config.h"
 #include "store/catalogue.h"
+#include "store/objects.h"
 
 /* url: of a database in PostgreSQL; NULL: SQLite. STORE_UNFIT: the two do not belong together, the database cannot be
  * written, its schema is newer than this program, or it refuses the credentials; nothing was written, and the log says
  * what is wrong. */
 store_result catalogue_open_at(const char *data, const char *url, catalogue **out);
+
+typedef struct store_place {
+  const char *data;
+  const char *catalogue; /* as above */
+  bucket_options bucket; /* url NULL: objects are files of the data folder */
+  uint64_t cache;        /* bytes of copies of objects in a object_bucket */
+} store_place;
+
+/* What the options say; points into them. */
+store_place store_place_of(const config *options);
+/* Opens both. STORE_UNFIT: as above, also for objects that belong to another catalogue, a bucket that does not exist or
+ * refuses. On failure the caller closes what was opened. */
+store_result stores_open(const store_place *place, objects **store, catalogue **cat);
 
 #endif

@@ -271,8 +271,8 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
     }
     queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
-  } else if (out.gone) {
-    queue_give_back(env->q, j); /* a worker plans it again */
+  } else if (out.gone || (objects_are_away(env->store) && !queue_cancel_wanted(env->q, j))) {
+    queue_give_back(env->q, j); /* a worker plans it again, once S3 is back */
   } else if (!lacks_memory(ctx, &problem) || !queue_needs_memory(env->q, j)) {
     finish_failed(env, j, ctx, &problem);
   }
@@ -288,6 +288,10 @@ static void run_one(worker_pool *pool, job *j, int threads) {
   const run_env *env = &pool->env;
   if (queue_cancel_wanted(env->q, j)) {
     queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
+    return;
+  }
+  if (objects_are_away(env->store)) {
+    queue_put_off(env->q, j);
     return;
   }
   if (job_kind(j) == API_JOB_FETCH) {

@@ -1,0 +1,47 @@
+/* Objects in a bucket of S3, each with the SHA-256 of its bytes beside it, against which every read is checked.
+ *
+ * While S3 does not answer, or refuses, every call fails at once with STORE_AWAY, and a thread asks each second whether
+ * it is back. A bucket belongs to one deployment: an object of its prefix names it. Any thread may call any function.
+ */
+#ifndef ORB_STORE_BUCKET_H
+#define ORB_STORE_BUCKET_H
+
+#include "store/result.h"
+#include "store/s3.h"
+
+enum { BUCKET_PART = 64 << 20, BUCKET_OWNER = 64, BUCKET_LINK = 8192 };
+
+typedef struct object_bucket object_bucket;
+
+typedef struct bucket_options {
+  const char *url;         /* see net/s3_url.h */
+  const char *keys;        /* a file of keys, as the programs of AWS have it; "": the environment */
+  const char *authorities; /* PEM file; "": those of the system */
+  uint64_t part;           /* objects that are larger are sent in parts of this size; 0: BUCKET_PART */
+} bucket_options;
+
+/* Reads who owns the bucket's prefix; "": nobody so far. Writes nothing. STORE_UNFIT: no bucket, or its keys are wrong;
+ * STORE_AWAY: no answer. Both are logged. */
+store_result bucket_open(const bucket_options *options, char owner[BUCKET_OWNER + 1], object_bucket **out);
+void bucket_close(object_bucket *b);
+/* Makes the prefix belong to `owner`. STORE_UNFIT: another one was faster; logged. */
+store_result bucket_claim(object_bucket *b, const char *owner);
+
+/* Uploads a whole file. */
+store_result bucket_put(object_bucket *b, const char *name, int fd);
+/* Writes an object to an empty file. STORE_CONFLICT: its bytes do not match their hash, also after some tries. */
+store_result bucket_get(object_bucket *b, const char *name, int fd, uint64_t *size);
+/* sha: of the object as it was uploaded; modified: when, a Unix time. Either may be NULL. */
+store_result bucket_look(object_bucket *b, const char *name, char sha[65], int64_t *modified);
+/* Also STORE_OK if there is no such object. */
+store_result bucket_delete(object_bucket *b, const char *name);
+/* Calls `each` for every object but the owner's. */
+store_result bucket_each(object_bucket *b, void (*each)(void *user, const char *name, uint64_t size), void *user);
+/* See s3_link(). */
+int bucket_link(object_bucket *b, const char *name, long seconds, const char *more, char out[BUCKET_LINK]);
+
+int bucket_is_away(object_bucket *b);
+/* SHA-256 of a file's bytes, in hexadecimal digits. 0: it cannot be read. */
+int bucket_hash(int fd, uint64_t from, uint64_t size, char out[65]);
+
+#endif

@@ -1,0 +1,15 @@
+/* Results of all functions of the store. */
+#ifndef ORB_STORE_RESULT_H
+#define ORB_STORE_RESULT_H
+
+typedef enum store_result {
+  STORE_OK = 0,
+  STORE_NOT_FOUND,
+  STORE_CONFLICT, /* a condition no longer holds */
+  STORE_FULL,     /* no space left */
+  STORE_ERROR,    /* input/output error; logged */
+  STORE_AWAY,     /* S3 does not answer, or refuses; it is asked until it is back; logged */
+  STORE_UNFIT,    /* only of opening: the configuration is wrong, see store/place.h; logged */
+} store_result;
+
+#endif

@@ -1,0 +1,212 @@
+// Objects in S3: what the daemon refuses at its start, what it keeps in its cache, and what happens when S3 goes away.
+// Runs under tests/tools/with_s3.sh. Other scenarios run there as they do with files.
+import assert from 'node:assert/strict';
+import { execFileSync, spawnSync } from 'node:child_process';
+import { existsSync } from 'node:fs';
+import { mkdir, mkdtemp, readdir, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import test from 'node:test';
+import { list, s3 } from '../tools/s3.mjs';
+import { assertProblem, Daemon, daemon, samples, until } from './support/daemon.mjs';
+import { tetrahedron } from './support/shapes.mjs';
+
+const server = process.env.ORB_S3;
+const program = process.env.ORB_DAEMON; // that starts with objects in files
+assert.ok(server && program, 'to be run by tests/tools/with_s3.sh');
+let pid = Number(process.env.ORB_S3_PID);
+
+const at = (bucket) => `s3://${bucket}?endpoint=${server}`;
+
+async function folder(t) {
+  const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+  t.after(() => rm(data, { recursive: true, force: true }));
+  return data;
+}
+
+const start = (data, args, env = {}) =>
+  spawnSync(program, ['--listen', '127.0.0.1:0', '--data', data, '--log-format', 'text', ...args], {
+    encoding: 'utf8',
+    timeout: 60_000,
+    env: { ...process.env, ...env },
+  });
+
+function refused(result, why) {
+  assert.equal(result.status, 78, result.stderr);
+  assert.match(result.stderr, why);
+  assert.equal(result.stdout, '');
+}
+
+/** A daemon whose objects are in a bucket with this prefix, and a function that empties its cache. */
+async function stored(t, prefix, ...args) {
+  const d = await daemon(t, { args: ['--objects', at(`objects/${prefix}`), ...args] });
+  const empty = () => rm(path.join(d.data, 'cache'), { recursive: true }).then(() => mkdir(path.join(d.data, 'cache')));
+  return { d, empty };
+}
+
+const keyOf = async (prefix, kind, id) => {
+  const keys = await list(server, 'objects', `${prefix}/${kind}/`);
+  return keys.find((key) => key.endsWith(id));
+};
+
+test('a missing bucket, wrong keys and a bucket of others are refused, and nothing is written', async (t) => {
+  const data = await folder(t);
+  refused(start(data, ['--objects', at('nowhere')]), /bucket nowhere does not exist/);
+  refused(
+    start(data, ['--objects', at('objects/new')], { AWS_SECRET_ACCESS_KEY: 'wrong-secret' }),
+    /refuses.*SignatureDoesNotMatch/,
+  );
+  refused(start(data, ['--objects', at('objects/new')], { AWS_ACCESS_KEY_ID: 'other:nobody' }), /refuses/);
+  refused(start(data, ['--objects', at('objects/new')], { AWS_ACCESS_KEY_ID: '' }), /set AWS_ACCESS_KEY_ID/);
+  for (const url of ['s3://x', 'http://a', 's3://bucket?endpoint=ftp://x', 's3://bucket?colour=red']) {
+    assert.equal(start(data, ['--objects', url]).status, 2, url);
+  }
+  const { d } = await stored(t, 'owned');
+  assert.equal((await d.upload(tetrahedron)).status, 201);
+  refused(start(data, ['--objects', at('objects/owned')]), /belongs to another deployment/);
+  assert.ok(!existsSync(path.join(data, 'catalogue.sqlite')));
+  assert.deepEqual(await list(server, 'objects', 'new'), []);
+  await d.stop();
+  refused(start(d.data, []), /are in S3: name their bucket/);
+  refused(start(d.data, ['--objects', at('objects/new')]), /none of the objects/);
+  for (const command of ['backup', 'restore']) {
+    const copy = spawnSync(program, [command, data, '--data', d.data], { encoding: 'utf8' });
+    assert.equal(copy.status, 2);
+    assert.match(copy.stderr, /versions in the bucket/);
+  }
+  assert.deepEqual(await list(server, 'objects', 'new'), []);
+
+  const files = await new Daemon(await folder(t), [], {});
+  files.program = [program];
+  await files.start();
+  assert.equal((await files.upload(tetrahedron)).status, 201);
+  await files.stop();
+  refused(start(files.data, ['--objects', at('objects/new')]), /are files: start without --objects/);
+});
+
+test('what was stored is served after the cache was emptied, whole and in ranges', async (t) => {
+  const { d, empty } = await stored(t, 'served');
+  const { id } = await d.mesh(path.join(samples, 'dog.obj'));
+  const embedding = await d.made('/v1/embeddings', { mesh: id });
+  const sphere = `/v1/embeddings/${embedding.id}/sphere.ply`;
+  const first = await d.get(sphere);
+  assert.equal(first.status, 200);
+  assert.ok(await keyOf('served', 'mesh', id));
+  assert.ok(await keyOf('served', 'sphere', embedding.id));
+  await d.stop();
+  await empty();
+  await d.start();
+  assert.ok((await d.get(sphere)).bytes.equals(first.bytes));
+  const part = await d.get(sphere, { headers: { range: 'bytes=100-199' } });
+  assert.equal(part.status, 206);
+  assert.ok(part.bytes.equals(first.bytes.subarray(100, 200)));
+  await empty(); // also while the daemon runs
+  assert.ok((await d.get(sphere)).bytes.equals(first.bytes));
+  assert.equal((await d.delete(`/v1/embeddings/${embedding.id}`)).status, 204);
+  assert.equal(await keyOf('served', 'sphere', embedding.id), undefined);
+  await d.stop();
+  const check = spawnSync(program, ['--check-data', '--data', d.data, '--objects', at('objects/served')], {
+    encoding: 'utf8',
+  });
+  assert.equal(check.status, 0, check.stdout + check.stderr);
+  assert.match(check.stdout, /1 rows and 1 objects checked: 0 wrong, 0 objects without a row/);
+});
+
+test('a damaged object in the bucket is found, and made again', async (t) => {
+  const { d, empty } = await stored(t, 'damaged');
+  const { id } = await d.mesh(path.join(samples, 'dog.obj'));
+  const request = { mesh: id };
+  const embedding = await d.made('/v1/embeddings', request);
+  const sphere = `/v1/embeddings/${embedding.id}/sphere.ply`;
+  const { bytes } = await d.get(sphere);
+  const key = await keyOf('damaged', 'sphere', embedding.id);
+  // As a disk of S3 would alter it: the hash beside it stays.
+  const meta = { sha256: (await s3(server, 'GET', `objects/${key}`)).headers.get('x-amz-meta-sha256') };
+  assert.match(meta.sha256, /^[0-9a-f]{64}$/);
+  const altered = Buffer.from(bytes);
+  altered[altered.length >> 1] ^= 1;
+  assert.ok((await s3(server, 'PUT', `objects/${key}`, altered, meta)).ok);
+  assert.ok((await d.get(sphere)).bytes.equals(bytes)); // from the cache
+  await empty();
+  assert.notEqual((await d.get(sphere)).status, 200);
+  assert.match(d.log, /object in S3 does not match its hash/);
+  assert.equal((await readdir(path.join(d.data, 'quarantine'))).length, 1);
+  await until(async () => (await d.get(`/v1/embeddings/${embedding.id}`)).status === 404, 'the row is deleted');
+  await d.made('/v1/embeddings', request);
+  assert.ok((await d.get(sphere)).bytes.equals(bytes));
+
+  // As someone who writes to the bucket would alter it: with the hash of the wrong bytes.
+  await d.stop();
+  await empty();
+  const { createHash } = await import('node:crypto');
+  const wrong = { sha256: createHash('sha256').update(altered).digest('hex') };
+  assert.ok((await s3(server, 'PUT', `objects/${key}`, altered, wrong)).ok);
+  await d.start();
+  assert.notEqual((await d.get(sphere)).status, 200);
+  await until(async () => (await d.get(`/v1/embeddings/${embedding.id}`)).status === 404, 'the row is deleted');
+});
+
+test('while S3 is away, requests get 503, the cache is served and jobs wait', async (t) => {
+  const { d, empty } = await stored(t, 'away');
+  const dog = await d.mesh(path.join(samples, 'dog.obj'));
+  const embedding = await d.made('/v1/embeddings', { mesh: dog.id });
+  const sphere = `/v1/embeddings/${embedding.id}/sphere.ply`;
+  const { bytes } = await d.get(sphere);
+  process.kill(pid, 'SIGKILL');
+  const reply = await d.upload(tetrahedron);
+  assertProblem(reply, 503, 'unavailable');
+  assert.ok(Number(reply.headers.get('retry-after')) > 0);
+  const ready = await d.get('/readyz');
+  assertProblem(ready, 503, 'unavailable');
+  assert.match(ready.json.detail, /S3/);
+  assert.ok((await d.get(sphere)).bytes.equals(bytes));
+  const job = await d.post('/v1/embeddings', { mesh: dog.id, method: 'kernel-sampling' });
+  assert.equal(job.status, 202);
+  await empty();
+  const lost = await d.get(sphere);
+  assertProblem(lost, 503, 'unavailable');
+
+  pid = Number(execFileSync(process.env.ORB_S3_START, { encoding: 'utf8' }));
+  await until(async () => (await d.get('/readyz')).status === 200, 'S3 is back', 60);
+  assert.match(d.log, /S3 is back/);
+  assert.ok((await d.get(sphere)).bytes.equals(bytes));
+  assert.equal((await d.upload(tetrahedron)).status, 201);
+  await until(async () => (await d.get(`/v1/jobs/${job.json.id}`)).json.state === 'succeeded', 'the job ends');
+});
+
+test('assets=redirect sends the caller to S3', async (t) => {
+  const { d } = await stored(t, 'redirect', '--assets', 'redirect');
+  const shapes = [];
+  for (const name of ['dog.obj', 'giraffe.off']) shapes.push({ mesh: (await d.mesh(path.join(samples, name))).id });
+  const { id } = await d.made('/v1/supermeshes', { shapes });
+  const asset = new URL(`/v1/supermeshes/${id}/asset.glb`, d.url);
+  const reply = await fetch(asset, { redirect: 'manual' });
+  assert.equal(reply.status, 307);
+  const to = reply.headers.get('location');
+  assert.ok(to.startsWith(`${server}/objects/redirect/asset/`));
+  const bytes = await fetch(to);
+  assert.equal(bytes.status, 200);
+  assert.equal(bytes.headers.get('content-type'), 'model/gltf-binary');
+  assert.equal(
+    Buffer.from(await bytes.arrayBuffer())
+      .subarray(0, 4)
+      .toString(),
+    'glTF',
+  );
+  assert.equal((await fetch(to.replace(/Signature=../, 'Signature=00'))).status, 403);
+});
+
+test('the cache stays within its bound', async (t) => {
+  const { d } = await stored(t, 'bound', '--cache-bytes', '1M');
+  const most = 1 << 20;
+  for (let i = 0; i < 8; i++) {
+    assert.equal((await d.upload(Buffer.from(`# ${i}${' '.repeat(300_000)}\n${tetrahedron}`))).status, 201);
+  }
+  let bytes = 0;
+  for (const entry of await readdir(path.join(d.data, 'cache'), { recursive: true, withFileTypes: true })) {
+    if (entry.isFile())
+      bytes += (await import('node:fs')).statSync(path.join(entry.parentPath ?? entry.path, entry.name)).size;
+  }
+  assert.ok(bytes > 300_000 && bytes <= most, `${bytes}`);
+  assert.equal((await list(server, 'objects', 'bound/mesh/')).length, 8);
+});
