@@ -60,10 +60,10 @@ count_junit() {
 }
 
 # Its daemon takes the numeric objects of the release build. So scenarios that mostly compute, and those that look at
-# documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL: its unit tests
-# run here.
-release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|.*_postgresql'
-# These run with sanitizers and SQLite; the release build runs the first four with PostgreSQL.
+# documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL and S3: their unit
+# tests run here.
+release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|.*_(postgresql|cluster)'
+# These run with sanitizers and SQLite; the release build runs the first four with PostgreSQL or a cluster's stores.
 asan_only='supermeshes|meshes|jobs|tenants|durability|crash'
 step_asan() {
   rm -f build-asan/tests.xml
