@@ -63,8 +63,9 @@ count_junit() {
 # documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL and S3: their unit
 # tests run here.
 release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|.*_(postgresql|cluster)'
-# These run with sanitizers and SQLite; the release build runs the first four with PostgreSQL or a cluster's stores.
-asan_only='supermeshes|meshes|jobs|tenants|durability|crash'
+# These test more without sanitizers, and run in both builds. All others have run with sanitizers when a full run comes to
+# the release build, and run there only if the build with sanitizers failed.
+in_both='clock|isolate|webhooks|deploy|slow|real_meshes'
 step_asan() {
   rm -f build-asan/tests.xml
   build_release
@@ -83,13 +84,17 @@ step_fuzz() {
   return $status
 }
 
+asan_only() {
+  ctest --test-dir build -N | sed -n 's/.*: scenario\.//p' | grep -vxE "$release_only|$in_both" | paste -sd'|'
+}
+
 step_release() {
   build_release
   local without=()
   if [ -n "$browser" ]; then
     without+=(-LE browser)
     if [ -f build-asan/tests.xml ]; then
-      without+=(-E "^scenario\.($asan_only)\$")
+      without+=(-E "^scenario\.($(asan_only))\$")
     fi
   fi
   run_tests build "${without[@]}"
