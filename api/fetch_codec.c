@@ -61,8 +61,9 @@ int api_fetch_request_load(const char *json, api_fetch_request *out, api_problem
   api_json_error error;
   cJSON *body = api_json_parse(json, strlen(json), &error);
   memset(out, 0, sizeof *out);
-  int fine = body ? read_members(body, out, problem)
-                  : api_refuse(problem, "corrupt", "The stored request of the job does not decode.");
+  int fine =
+      body ? read_members(body, out, problem)
+           : api_refuse(problem, "corrupt", "The stored request of the job cannot be read: send the request again.");
   const cJSON *quota = cJSON_GetObjectItemCaseSensitive(body, "quota");
   out->quota = cJSON_IsNumber(quota) ? (int64_t)quota->valuedouble : 0;
   cJSON_Delete(body);

@@ -156,7 +156,7 @@ int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_lis
   }
   int count = cJSON_GetArraySize(value);
   if (count > API_LANDMARKS_MAX) {
-    return api_refuse(problem, "bad-landmarks", "The request has %d landmarks; at most %d are accepted.", count,
+    return api_refuse(problem, "bad-landmarks", "The request has %d landmarks. Send at most %d.", count,
                       API_LANDMARKS_MAX);
   }
   if (shape_count == 0 && count > 0) {

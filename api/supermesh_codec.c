@@ -1,4 +1,5 @@
 #include "api/supermesh_codec.h"
+#include "api/transfer_codec.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -145,6 +146,27 @@ static void write_fit(const orb_fit_report *fit, api_text *out) {
   api_json_close(out, '}');
 }
 
+/* Where the template is too coarse for a shape. */
+static void write_coarse(const orb_coarse *coarse, double diagonal, api_text *out) {
+  api_json_key(out, "coarse");
+  api_json_open(out, '{');
+  api_json_member_number(out, "share", coarse->share);
+  api_json_member_integer(out, "count", coarse->count);
+  api_json_key(out, "triangles");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < coarse->listed; i++) {
+    api_json_integer(out, coarse->triangles[i]);
+  }
+  api_json_close(out, ']');
+  api_json_key(out, "errors_relative");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < coarse->listed; i++) {
+    api_json_number(out, coarse->errors[i] / diagonal);
+  }
+  api_json_close(out, ']');
+  api_json_close(out, '}');
+}
+
 static void write_shapes(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
                          api_text *out) {
   api_json_key(out, "shapes");
@@ -156,6 +178,9 @@ static void write_shapes(const char *id, const api_supermesh_request *request, c
     api_json_key(out, "sphere");
     api_text_printf(out, "\"/v1/supermeshes/%s/spheres/%d.ply\"", id, s);
     api_shape_report_members(out, &result->shapes[s]);
+    if (result->coarse && result->coarse[s].count > 0) {
+      write_coarse(&result->coarse[s], result->shapes[s].diagonal, out);
+    }
     write_fit(&result->fits[s], out);
     write_numbers("transform", result->transforms + 16 * (size_t)s, 16, out);
     api_json_close(out, '}');
@@ -341,7 +366,7 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_key(out, "asset");
   api_text_printf(out, "\"/v1/supermeshes/%s/asset.glb\"", id);
   api_json_member_integer(out, "asset_bytes", (int64_t)result->asset.size);
-  if (!result->is_document) {
+  if (result->has_profiles) {
     write_profiles(result->profiles, out);
   }
   api_json_member_integer(out, "vertices", result->supermesh.vertex_count);
@@ -358,6 +383,10 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   write_warnings(result, out);
   api_json_member_number(out, "energy", result->alignment.energy);
   write_dropped(result, out);
+  if (request->carry_count > 0) {
+    api_json_key(out, "transferred");
+    api_transferred_write(result->carried, result->carried_count, out);
+  }
   write_timings(&result->timings, embed_ms, out);
   api_json_member_raw(out, "request", canonical.data);
   api_json_member_string(out, "engine", ORB_ENGINE);

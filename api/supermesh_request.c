@@ -7,6 +7,7 @@
 
 #include "api/options.h"
 #include "api/supermesh_request.h"
+#include "api/transfer_codec.h"
 
 static const char *const aligns[] = {"pin", "rbf", "rotate", "auto", NULL};
 static const char *const presets[] = {"default", "fast", "quality", NULL};
@@ -185,7 +186,8 @@ static int check_built(const api_supermesh_request *request, api_problem *proble
 }
 
 int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, api_problem *problem) {
-  static const char *const known[] = {"shapes", "landmarks", "embedding", "align", "remesh", "asset", "template", NULL};
+  static const char *const known[] = {"shapes", "landmarks", "embedding", "align", "remesh",
+                                      "asset",  "template",  "transfer",  NULL};
   memset(out, 0, sizeof *out);
   orb_merge_defaults(&out->merge);
   orb_embed_defaults(&out->embedding);
@@ -201,6 +203,7 @@ int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, ap
   const cJSON *remesh = cJSON_GetObjectItemCaseSensitive(body, "remesh");
   const cJSON *asset = cJSON_GetObjectItemCaseSensitive(body, "asset");
   const cJSON *parts = cJSON_GetObjectItemCaseSensitive(body, "template");
+  const cJSON *transfer = cJSON_GetObjectItemCaseSensitive(body, "transfer");
   if (landmarks && cJSON_IsObject(landmarks)) {
     return api_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, \"auto\" or {\"id\": ID}.");
   }
@@ -211,7 +214,9 @@ int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, ap
          read_align(cJSON_GetObjectItemCaseSensitive(body, "align"), out, problem) &&
          (!remesh ||
           api_options_read(remesh, "\"remesh\"", remesh_table, COUNT(remesh_table), &out->merge.remesh, problem)) &&
-         check_built(out, problem) && (!parts || read_parts(parts, &out->parts, problem)) &&
+         check_built(out, problem) &&
+         (!transfer || api_transfer_read(transfer, out->shape_count, out->carries, &out->carry_count, problem)) &&
+         (!parts || read_parts(parts, &out->parts, problem)) &&
          (!asset || api_options_read(asset, "\"asset\"", asset_table, COUNT(asset_table), &out->merge.asset, problem));
 }
 
@@ -282,6 +287,10 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
   if (request->parts.mesh_count + request->parts.node_count > 0) {
     api_json_key(out, "template");
     write_parts(&request->parts, out);
+  }
+  if (request->carry_count > 0) {
+    api_json_key(out, "transfer");
+    api_transfer_write(request->carries, request->carry_count, out);
   }
   api_json_close(out, '}');
 }

@@ -17,12 +17,14 @@ typedef struct api_supermesh_request {
   } shapes[API_SHAPES_MAX];
   api_landmark_list landmarks;
   orb_embed_options embedding; /* for every shape */
-  orb_merge_options merge;     /* without file_parts: see api_supermesh_request_parts() */
+  orb_merge_options merge;     /* without file_parts, see api_supermesh_request_parts(), and carries */
   struct api_parts_spec {
     int32_t mesh_count, node_count;
     int32_t meshes[API_PARTS_MAX];
     char nodes[API_PARTS_MAX][ORB_NAME_MAX];
   } parts;
+  int32_t carry_count; /* "transfer" */
+  orb_carry carries[ORB_CARRY_MAX];
 } api_supermesh_request;
 
 /* Returns 1, or 0 with *problem filled. The caller frees *out in either case. */

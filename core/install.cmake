@@ -9,7 +9,7 @@ set_target_properties(orbmorph_shared PROPERTIES OUTPUT_NAME orbmorph EXPORT_NAM
   VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 target_include_directories(orbmorph_shared INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_link_libraries(orbmorph_shared PRIVATE PkgConfig::QHULL PkgConfig::CJSON PkgConfig::ZLIB PkgConfig::EXPAT
-  ${ORB_MESHOPT} ${ORB_DRACO} Threads::Threads m)
+  PkgConfig::PNG PkgConfig::JPEG ${ORB_MESHOPT} ${ORB_DRACO} Threads::Threads m)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND NOT ORB_SANITIZE)
   target_link_options(orbmorph_shared PRIVATE -Wl,-z,relro,-z,now)
 endif()
@@ -46,7 +46,7 @@ endif()
 set_target_properties(orbmorph_static PROPERTIES OUTPUT_NAME orbmorph EXPORT_NAME static LINKER_LANGUAGE CXX)
 target_compile_definitions(orbmorph_static INTERFACE ORB_STATIC)
 target_include_directories(orbmorph_static INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-target_link_libraries(orbmorph_static INTERFACE qhull_r cjson z expat meshoptimizer draco Threads::Threads m)
+target_link_libraries(orbmorph_static INTERFACE qhull_r cjson png jpeg z expat meshoptimizer draco Threads::Threads m)
 
 # orbmorph.pc finds its folders relative to itself: the files may be installed anywhere.
 set(libraries ${CMAKE_INSTALL_FULL_LIBDIR})

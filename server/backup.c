@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "folder_lock.h"
 #include "log.h"
 #include "store/snapshot.h"
 #include "store/transfer.h"
@@ -49,21 +50,6 @@ static int is_empty(const char *folder) {
   }
   closedir(dir);
   return empty;
-}
-
-/* Locks the folder as a daemon does; −1 if a process uses it. */
-static int lock_folder(const char *folder) {
-  char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/lock", folder);
-  int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  if (fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) == 0) {
-    return fd;
-  }
-  complain(folder, fd < 0 ? strerror(errno) : "is in use by another process");
-  if (fd >= 0) {
-    close(fd);
-  }
-  return -1;
 }
 
 static int put_mark(const char *folder) {
@@ -208,7 +194,7 @@ static int run_backup(const char *folder, const config *options) {
   if (empty < 0) {
     return 1;
   }
-  int lock = lock_folder(folder);
+  int lock = folder_lock(folder);
   int held = lock >= 0 && put_mark(folder) ? hold_deletions(options->data) : -1;
   int status = held >= 0 ? take(folder, options->data) : 1;
   if (held >= 0) {
@@ -261,7 +247,7 @@ static int run_restore(const char *folder, const config *options) {
   if (empty == 0) {
     complain(options->data, "is not empty: restore into a new folder; delete it if a restore was killed");
   }
-  int lock = empty == 1 && reading ? lock_folder(options->data) : -1;
+  int lock = empty == 1 && reading ? folder_lock(options->data) : -1;
   int status = lock >= 0 ? put_back(folder, options->data) : 1;
   if (lock >= 0) {
     close(lock);

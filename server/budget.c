@@ -8,7 +8,8 @@ enum { FILE_BASE = 4 << 20, FILE_BYTES = 24, DENSEST_BYTES = 200 };
 struct memory_budget {
   pthread_mutex_t lock;
   pthread_cond_t freed;
-  int64_t most[BUDGET_PARTS], taken[BUDGET_PARTS]; /* by part */
+  int64_t most[BUDGET_PARTS], taken[BUDGET_PARTS];      /* by part */
+  unsigned shortages[BUDGET_PARTS], told[BUDGET_PARTS]; /* told: how many there were when the listeners were called */
   struct {
     void (*freed)(void *user);
     void *user;
@@ -45,8 +46,10 @@ int64_t budget_most(const memory_budget *b, budget_part part) {
   return b->most[part];
 }
 
-static int has_room(const memory_budget *b, budget_part part, int64_t bytes) {
-  return bytes <= b->most[part] - b->taken[part];
+static int has_room(memory_budget *b, budget_part part, int64_t bytes) {
+  int room = bytes <= b->most[part] - b->taken[part];
+  b->shortages[part] += !room;
+  return room;
 }
 
 int budget_has_room(memory_budget *b, budget_part part, int64_t bytes) {
@@ -56,12 +59,26 @@ int budget_has_room(memory_budget *b, budget_part part, int64_t bytes) {
   return room;
 }
 
+int64_t budget_left(memory_budget *b, budget_part part) {
+  pthread_mutex_lock(&b->lock);
+  int64_t left = b->most[part] - b->taken[part];
+  pthread_mutex_unlock(&b->lock);
+  return left;
+}
+
 int budget_take(memory_budget *b, budget_part part, int64_t bytes) {
   pthread_mutex_lock(&b->lock);
   int room = has_room(b, part, bytes);
   b->taken[part] += room ? bytes : 0;
   pthread_mutex_unlock(&b->lock);
   return room;
+}
+
+unsigned budget_shortages(memory_budget *b, budget_part part) {
+  pthread_mutex_lock(&b->lock);
+  unsigned shortages = b->shortages[part];
+  pthread_mutex_unlock(&b->lock);
+  return shortages;
 }
 
 void budget_wait(memory_budget *b, budget_part part, int64_t bytes) {
@@ -77,8 +94,10 @@ void budget_give(memory_budget *b, budget_part part, int64_t bytes, const void *
   pthread_mutex_lock(&b->lock);
   b->taken[part] -= bytes;
   pthread_cond_broadcast(&b->freed);
+  int wanted = b->shortages[part] != b->told[part];
+  b->told[part] = b->shortages[part];
   pthread_mutex_unlock(&b->lock);
-  for (int i = 0; i < b->listener_count; i++) {
+  for (int i = 0; i < b->listener_count && wanted; i++) {
     if (b->listeners[i].user != self) {
       b->listeners[i].freed(b->listeners[i].user);
     }

@@ -9,12 +9,15 @@
 
 #include <stdint.h>
 
+enum { BUDGET_SMALL_FILE = 256 << 10 }; /* the check of a smaller one takes less than a second (docs/limits.md) */
+
 typedef struct memory_budget memory_budget;
 typedef enum budget_part { BUDGET_JOBS, BUDGET_CHECKS, BUDGET_SMALL, BUDGET_PARTS } budget_part;
 
 memory_budget *budget_create(int64_t job_memory); /* NULL: out of memory */
 void budget_destroy(memory_budget *b);
-/* Sets a function that is called when memory has become free. Before threads start; at most BUDGET_LISTENERS. */
+/* Sets a function that is called when memory has become free that someone asked for. Before threads start; at most
+ * BUDGET_LISTENERS. */
 enum { BUDGET_LISTENERS = 4 };
 void budget_listen(memory_budget *b, void (*freed)(void *user), void *user);
 
@@ -23,8 +26,14 @@ int64_t budget_most(const memory_budget *b, budget_part part);
 /* 1: taken. 0: there is no room now. bytes: at most budget_most(). */
 int budget_take(memory_budget *b, budget_part part, int64_t bytes);
 int budget_has_room(memory_budget *b, budget_part part, int64_t bytes);
+/* The room of a part, below 0 if it lent more than it has. Unlike the calls above, it is no shortage if that is little.
+ */
+int64_t budget_left(memory_budget *b, budget_part part);
+/* Changes whenever someone finds too little room: who keeps memory for later gives it back then. */
+unsigned budget_shortages(memory_budget *b, budget_part part);
 void budget_wait(memory_budget *b, budget_part part, int64_t bytes); /* takes them as soon as there is room */
-/* Gives back what was taken. Calls the listeners but that of the user `self`, whose lock the caller may hold. */
+/* Gives back what was taken. If there was too little room for someone since the last time, calls the listeners but that
+ * of the user `self`, whose lock the caller may hold. */
 void budget_give(memory_budget *b, budget_part part, int64_t bytes, const void *self);
 
 /* What the check of a file of other programs needs, and what the densest files known need (docs/limits.md); at most

@@ -178,6 +178,15 @@ void cache_drop(cache *c, resource_kind kind, const char *id) {
   pthread_mutex_unlock(&c->lock);
 }
 
+void cache_drop_all(cache *c) {
+  pthread_mutex_lock(&c->lock);
+  c->drops++;
+  while (c->oldest) {
+    drop(c, c->oldest);
+  }
+  pthread_mutex_unlock(&c->lock);
+}
+
 void cache_destroy(cache *c) {
   while (c && c->oldest) {
     drop(c, c->oldest);

@@ -31,5 +31,6 @@ void cache_release(cache *c, const cached *entry);
 const char *cache_keep_header(const cached *entry, const char *text);
 const char *cache_header(const cached *entry);                 /* NULL: none is kept */
 void cache_drop(cache *c, resource_kind kind, const char *id); /* for all tenants */
+void cache_drop_all(cache *c);
 
 #endif

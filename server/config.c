@@ -32,8 +32,7 @@ static const entry table[] = {
     {"data", TEXT(data), "orbmorph-data", "the data folder: everything that the daemon stores"},
     {"catalogue", TEXT(catalogue), "sqlite",
      "where rows are stored; sqlite: in the data folder; postgresql://…: in a database of PostgreSQL 15 or later, "
-     "which "
-     "one daemon uses at a time"},
+     "which several daemons may share if their objects are in S3"},
     {"objects", TEXT(objects), "files",
      "where meshes and results are stored; files: in the data folder; s3://BUCKET[/PREFIX]?endpoint=URL&region=R: in a "
      "bucket of S3, with copies in the data folder"},
@@ -46,6 +45,10 @@ static const entry table[] = {
      "stream: the daemon sends assets; redirect: with objects in S3, it answers 307 with a URL of S3 that is valid for "
      "15 minutes"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
+    {"role", TEXT(role), "all",
+     "of a node that shares its catalogue with others; serve: runs no jobs; work: runs jobs and has no port"},
+    {"lease-seconds", NUMBER(lease_seconds, 2, 3600), "30",
+     "other nodes take over the jobs of a node that is silent for this long"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
     {"worker-nice", NUMBER(worker_nice, 0, 19), "5",
      "nice value of jobs; the higher, the more they yield to other programs"},
@@ -269,6 +272,10 @@ static void print_help(void) {
       "                                 again into the same DIR: copies only what is new\n"
       "  orbmorphd restore DIR --data NEW\n"
       "                                 make a data folder from a backup; NEW must not exist or be empty\n"
+      "  orbmorphd migrate --from-data DIR [--from-catalogue URL] [--from-objects URL] [--from-s3-keys FILE]\n"
+      "                    --data NEW [--catalogue URL] [--objects URL]\n"
+      "                                 copy a deployment to another place, such as PostgreSQL and S3, or back;\n"
+      "                                 no daemon runs meanwhile; again after a kill: goes on\n"
       "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES]\n"
       "                                 [--quota-derived BYTES] [--quota-jobs N] [--priority 0..9] [--expires "
       "30d|YYYY-MM-DD|never]\n"
@@ -414,6 +421,20 @@ static int is_objects(const char *text) {
   return fine;
 }
 
+int config_is_shared(const config *options) {
+  return config_catalogue(options) != NULL && strcmp(options->objects, "files") != 0;
+}
+
+static int is_role(const config *options) {
+  static const char *const roles[] = {"all", "serve", "work", NULL};
+  int fine = is_one_of("role", options->role, roles);
+  if (fine && strcmp(options->role, "all") != 0 && !config_is_shared(options)) {
+    complain("role may be %s only with a catalogue in PostgreSQL and objects in S3", options->role);
+    return 0;
+  }
+  return fine;
+}
+
 const char *config_catalogue(const config *options) {
   return strcmp(options->catalogue, "sqlite") == 0 ? NULL : options->catalogue;
 }
@@ -464,7 +485,7 @@ static int consistent(config *out) {
     complain("tls-certificate and tls-key must both be set, or neither");
     return 0;
   }
-  return is_address(out->listen) && is_catalogue(out->catalogue) && is_objects(out->objects) &&
+  return is_address(out->listen) && is_catalogue(out->catalogue) && is_objects(out->objects) && is_role(out) &&
          is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
          is_one_of("assets", out->assets, assets) && is_readable("s3-keys", out->s3_keys) &&
          is_one_of("isolate", out->isolate, isolate) && is_one_of("log-level", out->log_level, levels) &&

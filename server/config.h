@@ -23,12 +23,13 @@ typedef struct config {
   char limits[16];     /* remote, all, off */
   char socket_mode[8]; /* octal */
   char isolate[16];    /* on, off, strict */
+  char role[16];       /* all, serve, work */
   int64_t workers, worker_nice, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, check_seconds, disk_reserve, drain_seconds, derived_bytes, quota_derived, keep_jobs;
   int64_t cache_bytes, lost_days, scrub_rate, scrub_seconds;
-  int64_t webhook_retry_seconds, fetch_seconds;
+  int64_t webhook_retry_seconds, fetch_seconds, lease_seconds;
 } config;
 
 typedef enum config_action {
@@ -51,6 +52,8 @@ int config_number(const char *text, int64_t *out);
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken));
 /* The URL of the catalogue; NULL: it is in the data folder. */
 const char *config_catalogue(const config *options);
+/* Whether other nodes may use the same catalogue and objects at the same time. */
+int config_is_shared(const config *options);
 config_action config_read(config *out, int argc, char **argv);
 
 #endif

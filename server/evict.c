@@ -16,14 +16,15 @@ static store_result evict(const evict_env *env, resource_kind kind, const char *
   static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
                                                     OBJECT_ALIGNMENT};
   FAULT_POINT("evict");
-  objects_exclude(env->store);
-  int gone = 1;
-  store_result result =
-      tenant ? catalogue_disown(env->cat, kind, id, tenant, &gone) : catalogue_delete(env->cat, kind, id);
+  int gone = 1, alone = objects_exclude(env->store);
+  store_result result = !alone   ? STORE_ERROR
+                        : tenant ? catalogue_disown(env->cat, kind, id, tenant, &gone)
+                                 : catalogue_delete(env->cat, kind, id);
   if (env->descriptions) {
     cache_drop(env->descriptions, kind, id);
   }
   FAULT_POINT("evict-row-gone");
+  gone = gone && objects_still_excludes(env->store); /* else the objects stay without a row, until --gc */
   if (result == STORE_OK && gone && kinds[kind] != OBJECT_KINDS) {
     result = objects_delete(env->store, kinds[kind], id);
   }

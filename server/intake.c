@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "faults.h"
+#include "isolate/readers.h"
 #include "log.h"
 #include "store/crashes.h"
 #include "store/owners.h"
@@ -77,24 +78,32 @@ int intake_check_here(const task_head *task, int fd, orb_context *ctx, api_text 
       return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
     }
   }
-  return check(task, bytes, ctx, json, problem); /* the end of the process unmaps them */
+  int fine = check(task, bytes, ctx, json, problem);
+  if (task->bytes > 0) {
+    munmap((void *)(uintptr_t)bytes, (size_t)task->bytes);
+  }
+  return fine;
+}
+
+/* Whether a description says what the daemon knows itself: jobs of all owners read the mesh as it says. */
+static int is_of(const task_head *task, const char *text) {
+  api_mesh_summary summary;
+  return api_mesh_summarise(text, &summary) && strcmp(summary.repair, task->repair) == 0 &&
+         (task->format == ORB_FORMAT_AUTO || strcmp(summary.format, orb_format_name(task->format)) == 0);
 }
 
 /* 1 with the description, 0 with the problem, −1: the process died or was stopped. */
 static int ask(isolated *process, const task_head *task, int fd, api_text *json, api_problem *problem) {
   const struct iovec begin = {(void *)(uintptr_t)task, sizeof *task};
-  input_head head = {.object = OBJECT_MESH};
-  const struct iovec input = {&head, sizeof head};
   frame f;
   done_head done;
   char *text = NULL;
-  if (isolate_send(process, FRAME_TASK, &begin, 1, -1) != CHANNEL_OK ||
-      isolate_send(process, FRAME_INPUT, &input, 1, fd) != CHANNEL_OK ||
-      isolate_send(process, FRAME_GO, NULL, 0, -1) != CHANNEL_OK ||
+  if (isolate_send(process, FRAME_TASK, &begin, 1, fd) != CHANNEL_OK ||
       isolate_receive(process, CHANNEL_MOST, &f) != CHANNEL_OK) {
     return -1;
   }
-  int fine = f.type == FRAME_DONE && task_read_done(&f, &done, &text, problem) && (!done.fine || text);
+  int fine =
+      f.type == FRAME_DONE && task_read_done(&f, &done, &text, problem) && (!done.fine || (text && is_of(task, text)));
   frame_free(&f);
   if (fine && done.fine) {
     api_text_add(json, text);
@@ -104,23 +113,51 @@ static int ask(isolated *process, const task_head *task, int fd, api_text *json,
   return fine ? done.fine : -1;
 }
 
-/* Checks the mesh in a process of its own. */
-static int check_isolated(const intake_file *file, const task_head *task, orb_context *ctx, const intake_limits *limits,
-                          api_text *json, api_problem *problem, int *died) {
-  isolated process;
-  char path[40], why[100];
-  snprintf(path, sizeof path, "/proc/self/fd/%d", file->temp->fd);
-  int fd = open(path, O_RDONLY | O_CLOEXEC);
-  if (fd < 0 || !isolate_open(&process, ctx)) {
-    if (fd >= 0) {
-      close(fd);
-    }
+/* As ask(), in a process that may have read other files of the tenant (*others), or, without a tenant, in one of its
+ * own. status: how it ended, if the result is −1. */
+static int ask_one(const task_head *task, int fd, const char *tenant, orb_context *ctx, const intake_limits *limits,
+                   api_text *json, api_problem *problem, int *others, int *status) {
+  isolated own, *process = &own;
+  task_head head = *task;
+  reader *r = tenant ? reader_take(tenant, limits->part, task->bytes, task->memory, ctx) : NULL;
+  *others = r && r->files > 0;
+  if (r) {
+    process = &r->process;
+    head.again = 1;
+    head.limit = r->memory;
+    head.inputs = READER_BYTES;
+    head.cpu_seconds += READER_WORK_MS / 1000;
+  } else if (!isolate_open(&own, ctx)) {
     return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
   }
-  process.wanted = limits->wanted;
-  process.user = limits->user;
-  int result = ask(&process, task, fd, json, problem);
-  int status = isolate_close(&process);
+  process->wanted = limits->wanted;
+  process->user = limits->user;
+  int result = ask(process, &head, fd, json, problem);
+  if (r && result >= 0) {
+    reader_give(r);
+  } else {
+    *status = r ? reader_end(r) : isolate_close(&own);
+  }
+  return result;
+}
+
+/* Checks the mesh in a process that no other tenant uses. */
+static int check_isolated(const intake_file *file, const task_head *task, const char *tenant, orb_context *ctx,
+                          const intake_limits *limits, api_text *json, api_problem *problem, int *died) {
+  char path[40], why[100];
+  int others, status = -1;
+  snprintf(path, sizeof path, "/proc/self/fd/%d", file->temp->fd);
+  int fd = open(path, O_RDONLY | O_CLOEXEC);
+  if (fd < 0) {
+    return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
+  }
+  int result = ask_one(task, fd, tenant, ctx, limits, json, problem, &others, &status);
+  if (result < 0 && others && orb_context_check(ctx) == ORB_OK) {
+    isolate_status_text(status, why, sizeof why);
+    log_warn("a process that checked several meshes, the last of them %s, %s; this one is checked again", file->id,
+             why);
+    result = ask_one(task, fd, NULL, ctx, limits, json, problem, &others, &status);
+  }
   close(fd);
   if (result >= 0) {
     return result;
@@ -136,10 +173,11 @@ static int check_isolated(const intake_file *file, const task_head *task, orb_co
                     "The process that read the file died. Please report this as a bug, with the file.");
 }
 
-static int describe(const intake_file *file, catalogue *cat, orb_context *ctx, const intake_limits *limits,
-                    int64_t created, api_text *json, api_problem *problem, int *died) {
+static int describe(const intake_file *file, catalogue *cat, const char *tenant, orb_context *ctx,
+                    const intake_limits *limits, int64_t created, api_text *json, api_problem *problem, int *died) {
   task_head task = {.kind = TASK_CHECK,
                     .threads = 1,
+                    .limit = limits->memory,
                     .memory = limits->memory,
                     .inputs = file->size,
                     .deadline_ms = limits->deadline_ms,
@@ -157,15 +195,14 @@ static int describe(const intake_file *file, catalogue *cat, orb_context *ctx, c
                       "Three processes that read this file have died, so it is refused until the operator clears "
                       "it (orbmorphd crash clear). Please report this as a bug, with the file.");
   }
-  return isolate_is_on() ? check_isolated(file, &task, ctx, limits, json, problem, died)
+  return isolate_is_on() ? check_isolated(file, &task, tenant, ctx, limits, json, problem, died)
                          : check(&task, file->bytes, ctx, json, problem);
 }
 
 /* Deletes an object that got no row. */
 static void drop_unused(catalogue *cat, objects *store, const char *id) {
   resource row = {0};
-  objects_exclude(store);
-  if (catalogue_get(cat, RESOURCE_MESH, id, &row) == STORE_NOT_FOUND) {
+  if (objects_exclude(store) && catalogue_get(cat, RESOURCE_MESH, id, &row) == STORE_NOT_FOUND) {
     objects_delete(store, OBJECT_MESH, id);
   }
   objects_let_go(store);
@@ -179,7 +216,7 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
   resource row = {.kind = RESOURCE_MESH, .bytes = file->size, .created = (int64_t)time(NULL) * 1000};
   int died = 0;
   *fresh = 0;
-  if (!describe(file, cat, ctx, limits, row.created, &json, problem, &died)) {
+  if (!describe(file, cat, tenant, ctx, limits, row.created, &json, problem, &died)) {
     if (died) {
       catalogue_crash_of_mesh(cat, file->id, tenant, row.created);
     }

@@ -7,6 +7,7 @@
 #define ORB_INTAKE_H
 
 #include "api/mesh_codec.h"
+#include "budget.h"
 #include "isolate/task.h"
 #include "store/catalogue.h"
 
@@ -27,6 +28,7 @@ void intake_close(intake_file *file); /* also deletes the temporary file if it i
 /* Limits on a check; the context has the same. */
 typedef struct intake_limits {
   int64_t memory, deadline_ms, max_triangles;
+  budget_part part;          /* of which the memory is */
   int (*wanted)(void *user); /* asked many times a second while a process checks: 0 ends it; NULL: always */
   void *user;
 } intake_limits;

@@ -17,9 +17,10 @@
 #include "evict.h"
 #include "http/certificate.h"
 #include "http/http.h"
-#include "isolate/isolate.h"
+#include "isolate/readers.h"
 #include "log.h"
 #include "maintain.h"
+#include "migrate.h"
 #include "net/client.h"
 #include "scrub.h"
 #include "store/place.h"
@@ -78,9 +79,15 @@ static void say_locked(const char *data, int lock) {
   }
 }
 
+static int has_role(const config *options, const char *role) {
+  return strcmp(options->role, role) == 0;
+}
+
 static void announce(const server *srv) {
   const char *text = srv->at.text;
-  if (strncmp(text, "unix:", 5) == 0) {
+  if (has_role(srv->options, "work")) {
+    puts("orbmorphd works without a port");
+  } else if (strncmp(text, "unix:", 5) == 0) {
     printf("orbmorphd listening on %s\n", text);
   } else {
     printf("orbmorphd listening on http%s://%s\n", srv->options->tls_key[0] ? "s" : "", text);
@@ -127,11 +134,11 @@ static void keep_budget(const server *srv, int64_t *seen, int *over) {
   const int64_t budget = srv->options->derived_bytes;
   const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
   evict_held(&env);
-  if (budget <= 0) {
+  if (budget <= 0 || !queue_keeps_house(srv->q)) {
     return;
   }
   int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED) + __atomic_load_n(&srv->profiles_made, __ATOMIC_RELAXED);
-  if (succeeded != *seen || *over) {
+  if (succeeded != *seen || *over || config_is_shared(srv->options)) { /* other nodes make results, too */
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     *seen = succeeded;
@@ -139,12 +146,12 @@ static void keep_budget(const server *srv, int64_t *seen, int *over) {
   }
 }
 
-enum { FORGET_BATCH = 256, FORGET_ROUNDS = 4 };
+enum { FORGET_BATCH = 256, FORGET_ROUNDS = 4, RECOUNT_MS = 60000 };
 
 /* Ended jobs in the catalogue. before: those from before this process started, less those forgotten since. */
 typedef struct ended_jobs {
   int counted;
-  int64_t before;
+  int64_t before, at; /* at: when they were counted, orb_clock_ms() */
 } ended_jobs;
 
 /* Deletes the oldest ended jobs beyond keep-jobs, in small batches so that other writes are not delayed. Counts the
@@ -152,15 +159,19 @@ typedef struct ended_jobs {
 static void keep_jobs(const server *srv, ended_jobs *jobs) {
   const int64_t keep = srv->options->keep_jobs;
   int64_t since = 0;
-  if (keep <= 0) {
+  if (keep <= 0 || !queue_keeps_house(srv->q)) {
     return;
+  }
+  if (config_is_shared(srv->options) && orb_clock_ms() - jobs->at >= RECOUNT_MS) { /* jobs end on other nodes, too */
+    jobs->counted = 0;
+    jobs->at = orb_clock_ms();
   }
   int64_t stored = jobs->counted ? 0 : catalogue_jobs_ended(srv->cat);
   for (int s = API_JOB_SUCCEEDED; s <= API_JOB_CANCELLED; s++) {
     since += queue_ended(srv->q, (api_job_state)s);
   }
   if (!jobs->counted && stored >= 0) {
-    *jobs = (ended_jobs){1, stored - since};
+    *jobs = (ended_jobs){1, stored - since, jobs->at};
   }
   for (int round = 0; round < FORGET_ROUNDS && jobs->counted && jobs->before + since > keep; round++) {
     int64_t many = jobs->before + since - keep;
@@ -310,7 +321,26 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   queue_stop(srv->q, 1);
 }
 
-static int start_outbox(server *srv, const deliver_options *options) {
+/* Another node may have changed what this one has in memory. */
+static void on_shared_change(void *user, const char *what) {
+  server *srv = user;
+  if (what[0] == 't') {
+    reload_callers(srv);
+  } else if (what[0] == '*') {
+    cache_drop_all(srv->descriptions);
+    reload_callers(srv);
+  } else if (what[0] == 'r' && what[1] >= '0' && what[1] < '0' + RESOURCE_KINDS) {
+    cache_drop(srv->descriptions, (resource_kind)(what[1] - '0'), what + 2);
+  }
+}
+
+static int keeps_house(void *q) {
+  return queue_keeps_house(q);
+}
+
+static int start_outbox(server *srv, deliver_options *options) {
+  options->may = keeps_house;
+  options->user = srv->q;
   srv->outbox = deliver_start(options, srv->cat);
   if (srv->outbox) {
     queue_on_end(srv->q, deliver_wake, srv->outbox);
@@ -364,10 +394,17 @@ static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   srv->memory = budget_create(o->job_memory);
+  const queue_sharing sharing = {.url = o->catalogue,
+                                 .data = o->data,
+                                 .works = !has_role(o, "serve"),
+                                 .lease_ms = 1000 * o->lease_seconds,
+                                 .changed = on_shared_change,
+                                 .user = srv};
   queue_options queued = {.workers = (int)o->workers,
                           .cores = cores > 0 ? (int)cores : 1,
                           .limit = (int)o->queue_limit,
-                          .memory = srv->memory};
+                          .memory = srv->memory,
+                          .sharing = config_is_shared(o) ? &sharing : NULL};
   worker_options limits = {.workers = (int)o->workers,
                            .nice = (int)o->worker_nice,
                            .job_memory = o->job_memory,
@@ -389,17 +426,18 @@ static int start(server *srv, worker_pool **workers) {
   if (queued.cores < queued.workers) {
     queued.cores = queued.workers;
   }
-  int listens = listen_open(o, &srv->at);
+  int serves = !has_role(o, "work"), listens = !serves || listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
   return listens && srv->memory && open_stores(srv) && check_catalogue(srv) &&
          (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
-         (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
-         (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) &&
-         (srv->io = tasks_start((int)o->io_threads, NULL)) &&
+         (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->q = queue_create(&queued, srv->cat)) &&
+         queue_recover(srv->q, isolate_is_on()) == STORE_OK && heals(srv) &&
+         (srv->io = tasks_start((int)o->io_threads, NULL)) && readers_start(srv->memory) &&
          (srv->checks = tasks_start((int)o->workers, srv->memory)) &&
          (srv->large_checks = tasks_start((int)o->workers, srv->memory)) && net_start() &&
-         start_outbox(srv, &delivered) && (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) &&
-         http_start(srv) && start_scrub(srv);
+         start_outbox(srv, &delivered) &&
+         (!sharing.works || (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store))) &&
+         (!serves || http_start(srv)) && start_scrub(srv);
 }
 
 /* Stops all parts that were started. */
@@ -422,12 +460,13 @@ static void stop(server *srv, worker_pool *workers) {
   if (srv->signers) {
     signers_store_use(srv->signers);
   }
+  deliver_stop(srv->outbox); /* workers and tasks have ended: nothing wakes it any more */
+  readers_stop();            /* they give memory back, and the budget tells the queue and the pools */
   queue_destroy(srv->q);
   tasks_free(srv->io);
   tasks_free(srv->checks);
   tasks_free(srv->large_checks);
   budget_destroy(srv->memory);
-  deliver_stop(srv->outbox); /* nothing wakes it any more */
   catalogue_close(srv->cat);
   objects_close(srv->store);
   cache_destroy(srv->descriptions);
@@ -495,7 +534,9 @@ int main(int argc, char **argv) {
   }
   const admin_kind *kind = argc > 1 ? admin_kind_named(admin_kinds, argv[1]) : NULL;
   backup_command backup = {0};
-  if ((kind && !admin_command_read(&admin, kind, &argc, argv)) || !backup_command_read(&backup, &argc, argv)) {
+  migrate_command migrate;
+  if ((kind && !admin_command_read(&admin, kind, &argc, argv)) || !backup_command_read(&backup, &argc, argv) ||
+      !migrate_command_read(&migrate, &argc, argv)) {
     return 2;
   }
   config_action action = config_read(&options, argc, argv);
@@ -515,6 +556,9 @@ int main(int argc, char **argv) {
     case CONFIG_RUN:
       if (backup.run) {
         return backup.run(backup.folder, &options);
+      }
+      if (migrate.data) {
+        return migrate_run(&migrate, &options);
       }
       if (!admin.kind) {
         return run(&(command_line){argc, argv, &options});

@@ -67,9 +67,9 @@ static void say(scrub *s, const resource *row, const char *what, const char *fou
 
 /* Whether a row names an object that does not exist. A resource may be deleted or replaced meanwhile. */
 static int is_missing(scrub *s, const resource *row, const named_object *object) {
-  objects_exclude(s->store);
+  int alone = objects_exclude(s->store);
   store_result found = objects_look(s->store, object->kind, row->id);
-  int missing = found == STORE_NOT_FOUND && evict_is_named(s->cat, object->kind, row->id);
+  int missing = alone && found == STORE_NOT_FOUND && evict_is_named(s->cat, object->kind, row->id);
   objects_let_go(s->store);
   return missing;
 }
@@ -115,8 +115,7 @@ static void look_for_row(void *user, object_kind kind, const char *id, uint64_t 
   if (evict_is_named(s->cat, kind, id) || !pay(s, SEEK)) {
     return;
   }
-  objects_exclude(s->store);
-  if (!evict_is_named(s->cat, kind, id) && objects_look(s->store, kind, id) == STORE_OK) {
+  if (objects_exclude(s->store) && !evict_is_named(s->cat, kind, id) && objects_look(s->store, kind, id) == STORE_OK) {
     s->now.without_row++;
   }
   objects_let_go(s->store);

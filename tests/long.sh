@@ -2,11 +2,12 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust templates deploy blender
-#   visit
+#   tsan valgrind fuzz crash migrate cluster attacks deaths faults faults_asan soak load adversarial arm robust templates
+#   deploy blender visit
 #
-# ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_TEST_PATIENCE how many
-# times longer than usual scenarios wait for what should come: 4 with tsan, 20 with valgrind.
+# ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_ROUNDS (500) that of
+# rounds of chaos among several nodes, ORB_TEST_PATIENCE how many times longer than usual scenarios wait for what should
+# come: 4 with tsan, 20 with valgrind.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
 
@@ -84,6 +85,21 @@ part_crash() {
     node --test --test-reporter=spec tests/scenario/crash.test.mjs
   ORB_HOOK_KILLS=${ORB_KILLS:-1000} ORBMORPHD=build-faults/bin/orbmorphd \
     node --test --test-reporter=spec tests/scenario/webhooks.test.mjs
+}
+
+# orbmorphd migrate is killed at ORB_KILLS (200) random moments, between SQLite and files, PostgreSQL and S3.
+part_migrate() {
+  cmake --preset release >/dev/null
+  cmake --build build --target orbmorphd
+  ORBMORPHD="$PWD/build/bin/orbmorphd" tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/long/migrate.mjs
+}
+
+# Several nodes on PostgreSQL and S3, which are killed, paused and cut off, by turns.
+part_cluster() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target orbmorphd
+  ORB_ROUNDS=${ORB_ROUNDS:-500} ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh tests/tools/with_s3.sh \
+    node --test --test-reporter=spec tests/scenario/nodes.test.mjs
 }
 
 # All attacks of tests/scenario/attacks.test.mjs, with larger files and from several connections at once.
@@ -207,7 +223,7 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust templates deploy \
+  set -- tsan valgrind fuzz crash migrate cluster attacks deaths faults faults_asan soak load adversarial arm robust templates deploy \
     blender visit
 fi
 for part in "$@"; do

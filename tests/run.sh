@@ -7,10 +7,11 @@
 #   build      builds the studio and the release build, with warnings as errors
 #   asan       unit and scenario tests, in a build with AddressSanitizer and UndefinedBehaviorSanitizer
 #   release    every test, in the release build; in a full run without the scenarios that asan has run
-#   fuzz       each fuzz target for ORB_FUZZ_SECONDS (10)
+#   fuzz       each fuzz target for ORB_FUZZ_SECONDS (7) of CPU time
 #   core       only the library and its unit tests, where the daemon does not build; not part of a full run
 #
-# In a full run the tests in a browser, which run one at a time and mostly wait, run beside asan and release.
+# In a full run the tests in a browser, which run one at a time and mostly wait, run beside asan and release, and so do the
+# fuzz targets, in the time that the tests leave.
 #
 # A step that fails does not keep later steps from running. The last line is "N passed, N failed, N skipped", summed
 # over tests and fuzz targets; a step that fails outside a test counts as one failure. The exit status is 0 only if
@@ -62,7 +63,7 @@ count_junit() {
 # Its daemon takes the numeric objects of the release build. So scenarios that mostly compute, and those that look at
 # documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL and S3: their unit
 # tests run here.
-release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|.*_(postgresql|cluster)'
+release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|migrate|nodes|.*_(postgresql|cluster)'
 # These test more without sanitizers, and run in both builds. All others have run with sanitizers when a full run comes to
 # the release build, and run there only if the build with sanitizers failed.
 in_both='clock|isolate|webhooks|deploy|slow|real_meshes'
@@ -75,17 +76,25 @@ step_asan() {
 }
 
 # From one seed, so that two runs try much the same inputs; long runs look for new ones.
+run_fuzz() {
+  rm -f build-fuzz/results
+  ORB_FUZZ_SEED=1 ORB_PLAIN="$PWD/build" "$@" tests/fuzz/run.sh --cpu "${ORB_FUZZ_SECONDS:-7}"
+}
+
 step_fuzz() {
   local status=0
-  rm -f build-fuzz/results
   build_release
-  ORB_FUZZ_SEED=1 ORB_PLAIN="$PWD/build" tests/fuzz/run.sh "${ORB_FUZZ_SECONDS:-10}" || status=$?
+  run_fuzz || status=$?
   cut -d' ' -f1 build-fuzz/results >>"$totals"
   return $status
 }
 
+# Also units in which every call fails once: sanitizers see what is left behind then.
 asan_only() {
-  ctest --test-dir build -N | sed -n 's/.*: scenario\.//p' | grep -vxE "$release_only|$in_both" | paste -sd'|'
+  {
+    ctest --test-dir build -N | sed -n 's/.*: \(scenario\..*\)/\1/p' | grep -vxE "scenario\.($release_only|$in_both)"
+    ctest --test-dir build -N | sed -n 's/.*: \(unit\.torture_.*\)/\1/p'
+  } | paste -sd'|'
 }
 
 step_release() {
@@ -94,7 +103,7 @@ step_release() {
   if [ -n "$browser" ]; then
     without+=(-LE browser)
     if [ -f build-asan/tests.xml ]; then
-      without+=(-E "^scenario\.($(asan_only))\$")
+      without+=(-E "^($(asan_only))\$")
     fi
   fi
   run_tests build "${without[@]}"
@@ -124,6 +133,25 @@ finish_browser() {
   ended browser $status "$browser_began" "$failures"
 }
 
+# Starts the fuzz targets beside the steps that follow. Tests wait for a quarter of the cores' time; at this priority, the
+# targets take little else. They count CPU time, so they try as much as alone.
+fuzz= fuzz_began=
+start_fuzz() {
+  (run_fuzz env nice -n 15) >build/fuzz.log 2>&1 &
+  fuzz=$! fuzz_began=$SECONDS
+}
+
+finish_fuzz() {
+  local status=0 failures
+  failures=$(sum failed)
+  echo "== fuzz =="
+  wait "$fuzz" || status=$?
+  fuzz=
+  cat build/fuzz.log
+  cut -d' ' -f1 build-fuzz/results >>"$totals" || status=1
+  ended fuzz $status "$fuzz_began" "$failures"
+}
+
 # Without warnings as errors: it is for compilers that the rest of the tree has not met.
 step_core() {
   cmake --preset core -DORB_TESTS=ON >/dev/null
@@ -140,7 +168,7 @@ for step in "$@"; do
 done
 
 totals=$(mktemp)
-trap 'rm -f "$totals"; [ -z "$browser" ] || kill "$browser"' EXIT
+trap 'rm -f "$totals"; [ -z "$browser$fuzz" ] || kill $browser $fuzz' EXIT
 sum() {
   grep -cx "$1" "$totals" || true
 }
@@ -178,13 +206,16 @@ else
   run_step build
   if [ $status -eq 0 ]; then
     start_browser
+    start_fuzz
   fi
   run_step asan
   run_step release
   if [ -n "$browser" ]; then
     finish_browser
+    finish_fuzz
+  else
+    run_step fuzz
   fi
-  run_step fuzz
 fi
 echo "$(sum passed) passed, $(sum failed) failed, $(sum skipped) skipped"
 [ "$(sum failed)" -eq 0 ]

@@ -12,8 +12,8 @@
 #define MERGE_OPTIONS                                                                                         \
   (COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) | \
    CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |      \
-   CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) |  \
-   CLI_REPAIRS | CLI_BIT(OPT_PROFILE))
+   CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_TRANSFER) | CLI_BIT(OPT_SET) | \
+   CLI_BIT(OPT_NO_WAIT) | CLI_REPAIRS | CLI_BIT(OPT_PROFILE))
 
 static const cli_command command_list[] = {
     {"morph", "FILE FILE…", "Upload meshes, merge them and download a GLB that morphs between them", 2, -1,

@@ -17,6 +17,51 @@ static void set_text(const cli *c, cJSON *request, cli_option_id option, const c
   }
 }
 
+/* One entry of --transfer, such as 1:texture:2048. NULL: it is none. */
+static cJSON *read_transfer(char *entry, long shapes) {
+  char *what = strchr(entry, ':'), *texels = what ? strchr(what + 1, ':') : NULL;
+  long from, resolution = 0;
+  if (!what) {
+    return NULL;
+  }
+  *what++ = 0;
+  if (texels) {
+    *texels++ = 0;
+  }
+  if (!cli_whole_number(entry, 0, shapes - 1, &from) || !*what ||
+      (texels && !cli_whole_number(texels, 16, 8192, &resolution))) {
+    return NULL;
+  }
+  cJSON *out = cJSON_CreateObject();
+  cJSON_AddNumberToObject(out, "from", (double)from);
+  cJSON_AddStringToObject(out, "what", what);
+  if (texels) {
+    cJSON_AddNumberToObject(out, "resolution", (double)resolution);
+  }
+  return out;
+}
+
+static int add_transfer(const cli *c, cJSON *request) {
+  const char *list = c->args.value[OPT_TRANSFER];
+  char *text = list ? cli_text("%s", list) : NULL, *rest = text, *entry;
+  cJSON *out = list ? cJSON_AddArrayToObject(request, "transfer") : NULL;
+  int rc = CLI_DONE;
+  while (rc == CLI_DONE && rest && (entry = strsep(&rest, ","))) {
+    cJSON *item = read_transfer(entry, c->args.operand_count);
+    if (item) {
+      cJSON_AddItemToArray(out, item);
+    } else {
+      cli_error(c,
+                "--transfer takes a list such as 1:skin,1:texture:2048 (the shape, from 0; what; texels a side), not "
+                "'%s'",
+                list);
+      rc = CLI_USAGE;
+    }
+  }
+  free(text);
+  return rc;
+}
+
 static int add_options(const cli *c, cJSON *request) {
   const char *tolerance = c->args.value[OPT_TOLERANCE], *triangles = c->args.value[OPT_MAX_TRIANGLES];
   double x;
@@ -47,6 +92,10 @@ static int add_options(const cli *c, cJSON *request) {
   }
   if (c->args.value[OPT_NO_NORMALS]) {
     cli_set_member(request, "asset.normals", cJSON_CreateBool(0));
+  }
+  int rc = add_transfer(c, request);
+  if (rc != CLI_DONE) {
+    return rc;
   }
   return cli_apply_sets(c, request);
 }

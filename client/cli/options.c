@@ -29,6 +29,10 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_ANIMATION] = {"animation", 0, "KIND", "pingpong none", "animation in the asset"},
     [OPT_FIT] = {"fit", 0, "KIND", "auto none rigid similarity", "move the other shapes onto the first"},
     [OPT_PATH] = {"path", 0, "KIND", "linear rigid", "path of the vertices between shapes"},
+    [OPT_TRANSFER] =
+        {"transfer", 0, "LIST", NULL,
+         "give the asset what other shapes have: SHAPE:skin, color, texcoord, targets or texture[:TEXELS], "
+         "separated by commas"},
     [OPT_SET] = {"set", 0, "NAME=VALUE", NULL, "set any member of the request, such as align.options.radius=0.5"},
     [OPT_NO_WAIT] = {"no-wait", 0, NULL, NULL, "print the job and do not wait for it"},
     [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh; default: the name of the file"},

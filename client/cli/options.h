@@ -22,6 +22,7 @@ typedef enum cli_option_id {
   OPT_ANIMATION,
   OPT_FIT,
   OPT_PATH,
+  OPT_TRANSFER,
   OPT_SET,
   OPT_NO_WAIT,
   OPT_NAME,

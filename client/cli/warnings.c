@@ -158,6 +158,29 @@ static int warn_of_errors(FILE *out, const char *bullet, const cJSON *supermesh)
   return count > 0;
 }
 
+/* Where a template is too coarse for a shape: the farthest triangles by their numbers in the first file. */
+static int warn_of_template(FILE *out, const char *bullet, const cJSON *supermesh) {
+  enum { NAMED = 3 };
+  const cJSON *shape;
+  int count = 0;
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    const cJSON *coarse = member(shape, "coarse"), *triangles = member(coarse, "triangles");
+    if (!coarse) {
+      continue;
+    }
+    fprintf(out,
+            "%sThe mesh of %s is too coarse for %s at %.0f of its triangles (%.2g %% of the surface); subdivide it",
+            bullet, name_of(supermesh, 0), cli_string(shape, "name", "?"), cli_number(coarse, "count"),
+            100 * cli_number(coarse, "share"));
+    for (int i = 0; i < NAMED && i < cJSON_GetArraySize(triangles); i++) {
+      fprintf(out, "%s %.0f", i ? "," : " around triangle", cJSON_GetNumberValue(cJSON_GetArrayItem(triangles, i)));
+    }
+    fputs(".\n", out);
+    count++;
+  }
+  return count;
+}
+
 static int warn_of_fits(FILE *out, const char *bullet, const cJSON *supermesh) {
   const cJSON *shape;
   int count = 0;
@@ -176,5 +199,5 @@ int cli_warnings(FILE *out, const char *bullet, const cJSON *supermesh) {
   return warn_of_match(out, bullet, supermesh) + warn_of_suspects(out, bullet, supermesh) +
          warn_of_pairs(out, bullet, supermesh) + warn_of_places(out, bullet, supermesh) +
          warn_of_landmarks(out, bullet, supermesh) + warn_of_errors(out, bullet, supermesh) +
-         warn_of_fits(out, bullet, supermesh);
+         warn_of_template(out, bullet, supermesh) + warn_of_fits(out, bullet, supermesh);
 }

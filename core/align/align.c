@@ -4,7 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/found.h"
+#include "align/find/match.h"
 #include "align/find/suspects.h"
+#include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "base/check.h"
 #include "base/context.h"
@@ -55,6 +58,68 @@ static orb_status check_request(orb_context *ctx, const orb_align_shape *shapes,
   return ORB_OK;
 }
 
+/* Does a decimated copy of a later shape decide where its limbs go? Only the composed map takes long on large shapes.
+ */
+static int is_large(const orb_align_shape *shapes, int32_t shape_count, const orb_align_options *options) {
+  const orb_map_params params = orb_map_params_of(options->preset);
+  int32_t most = 0;
+  for (int32_t s = 1; s < shape_count; s++) {
+    most = shapes[s].mesh->vertex_count > most ? shapes[s].mesh->vertex_count : most;
+  }
+  return options->preset != ORB_PRESET_FAST && most > params.copies.large &&
+         (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
+}
+
+static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                               const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                               orb_alignment *out) {
+  return options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1
+             ? orb_align_auto(ctx, shapes, shape_count, options, out)
+             : orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+}
+
+/* Aligns copies of the later shapes, and lets the shapes follow. *lifted 0: the whole shapes are to be aligned, since
+ * the copies do not meet at the landmarks, or a shape cannot follow its copy. `out` is then empty. */
+static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                               const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                               orb_alignment *out, int *lifted) {
+  const orb_map_params params = orb_map_params_of(options->preset);
+  const int32_t each = params.level.kept_each * landmark_count;
+  const int32_t keep_until = landmark_count == 0 ? 4 : each > params.level.kept ? each : params.level.kept;
+  const int32_t size = 2 * keep_until > params.copies.size ? 2 * keep_until : params.copies.size;
+  orb_copies copies;
+  orb_status status;
+  *lifted = 0;
+  ORB_GO(status, orb_copies_create(ctx, shapes, shape_count, landmarks, landmark_count, size, keep_until, &copies),
+         end);
+  status = align_shapes(ctx, copies.shapes, shape_count, copies.landmarks, landmark_count, options, out);
+  if (status == ORB_E_BAD_LANDMARKS) {
+    orb_error_clear(ctx);
+    status = ORB_OK;
+  } else if (status == ORB_OK) {
+    status = orb_align_lift(ctx, &copies, landmarks, options->preset, out, lifted);
+  }
+end:
+  orb_copies_free(ctx, &copies);
+  return status;
+}
+
+/* What a reader may know of the alignment: found landmarks and how sure they are, or landmarks that may be misplaced.
+ */
+static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
+                           const orb_align_options *options, orb_alignment *out) {
+  if (options->method != ORB_ALIGN_AUTO || out->landmark_count > 0 || out->shape_count == 1) {
+    return orb_align_suspects(ctx, shapes, landmarks, options, out);
+  }
+  const double clear = out->match.clear;
+  if (out->match.is_measured) {
+    out->match.confidence = orb_match_confidence(out->match.bend, clear, out->energy);
+  } else {
+    memset(&out->match, 0, sizeof out->match);
+  }
+  return orb_align_find(ctx, out, clear);
+}
+
 orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                      const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                      orb_alignment *out) {
@@ -62,13 +127,16 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
   ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
   const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
-  orb_status status;
-  if (options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1) {
-    status = orb_align_auto(ctx, shapes, shape_count, options, out);
-  } else {
-    status = orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
-    status = status == ORB_OK ? orb_align_suspects(ctx, shapes, landmarks, options, out) : status;
+  orb_status status = ORB_OK;
+  int lifted = 0;
+  if (is_large(shapes, shape_count, options)) {
+    ORB_GO(status, align_copies(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &lifted), end);
   }
+  if (!lifted) {
+    ORB_GO(status, align_shapes(ctx, shapes, shape_count, landmarks, landmark_count, options, out), end);
+  }
+  status = describe(ctx, shapes, landmarks, options, out);
+end:
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
   }

@@ -8,7 +8,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/find/found.h"
 #include "align/find/match.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
@@ -283,13 +282,12 @@ end:
 /* What a caller may know of the matches: how sure the best ones are, and the next ones. */
 static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                                    orb_alignment *out) {
+  out->match.clear = m->clear;
   if (!m->are_found) {
     return ORB_OK;
   }
   out->match.is_measured = 1;
   out->match.bend = m->bend;
-  out->match.clear = m->clear;
-  out->match.confidence = orb_match_confidence(m->bend, m->clear, out->energy);
   return write_alternatives(ctx, shapes, m, out);
 }
 
@@ -300,12 +298,12 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   rotated.preset = ORB_PRESET_FAST;
   ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
   orb_status status = ORB_OK;
+  out->match.clear = 1;
   if (options->preset != ORB_PRESET_FAST) {
     ORB_GO(status, find_matches(ctx, shapes, shape_count, &m), end);
     ORB_GO(status, follow_matches(ctx, shapes, &m, options, out), end);
-    ORB_GO(status, describe_matches(ctx, shapes, &m, out), end);
+    status = describe_matches(ctx, shapes, &m, out);
   }
-  status = orb_align_find(ctx, out, m.clear);
 end:
   matches_free(ctx, &m);
   if (status != ORB_OK) {

@@ -1,5 +1,6 @@
 /* Alignment by one method: each shape gets a working copy with the landmarks as vertices, the method runs, the result
- * is certified, and the composed map is improved. Soft landmarks are let go at the end. */
+ * is certified, and the composed map is improved. Soft landmarks are let go at the end. Shapes of which copies have
+ * been aligned follow their copies. */
 #include <math.h>
 #include <string.h>
 
@@ -14,6 +15,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "numeric/vec3.h"
 
 static orb_status run_method(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const orb_landmark *landmarks,
                              int32_t landmark_count, const orb_align_options *options) {
@@ -73,13 +75,35 @@ static int is_soft(const orb_landmark *landmark) {
   return landmark->weight > 0 && landmark->weight < 1;
 }
 
-/* The springs between the first shape and shape s. */
-static void set_springs(const orb_landmark *landmarks, const orb_alignment *a, int32_t s, orb_map_springs *out) {
+static int32_t count_soft(const orb_landmark *landmarks, int32_t count) {
+  int32_t soft = 0;
+  for (int32_t l = 0; l < count; l++) {
+    soft += is_soft(&landmarks[l]);
+  }
+  return soft;
+}
+
+static orb_status springs_create(orb_context *ctx, int32_t count, orb_map_springs *out) {
+  *out = (orb_map_springs){.moving = ORB_NEW(ctx, int32_t, count),
+                           .fixed = ORB_NEW(ctx, int32_t, count),
+                           .weight = ORB_NEW(ctx, double, count)};
+  return out->moving && out->fixed && out->weight ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+static void springs_free(orb_context *ctx, orb_map_springs *springs) {
+  orb_free(ctx, springs->moving);
+  orb_free(ctx, springs->fixed);
+  orb_free(ctx, springs->weight);
+}
+
+/* The springs between these vertices of the two shapes, one a landmark. */
+static void set_springs(const orb_landmark *landmarks, int32_t count, const int32_t *fixed, const int32_t *moving,
+                        orb_map_springs *out) {
   out->count = 0;
-  for (int32_t l = 0; l < a->landmark_count; l++) {
+  for (int32_t l = 0; l < count; l++) {
     if (is_soft(&landmarks[l])) {
-      out->fixed[out->count] = a->shapes[0].landmark_vertices[l];
-      out->moving[out->count] = a->shapes[s].landmark_vertices[l];
+      out->fixed[out->count] = fixed[l];
+      out->moving[out->count] = moving[l];
       out->weight[out->count++] = landmarks[l].weight / (1 - landmarks[l].weight);
     }
   }
@@ -97,25 +121,18 @@ static void free_landmarks(const orb_landmark *landmarks, int32_t count, orb_ali
 /* Soft landmarks say where to look, not where to end. They were pinned with the others, so that the map takes each limb
  * to its limb. Now the map is composed once more with them free, and a spring draws the places of each together. */
 static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, orb_preset preset, orb_alignment *alignment) {
-  const int32_t count = alignment->landmark_count;
-  int32_t soft = 0;
-  for (int32_t l = 0; l < count; l++) {
-    soft += is_soft(&landmarks[l]);
-  }
+  const int32_t count = alignment->landmark_count, soft = count_soft(landmarks, count);
   if (soft == 0 || alignment->shape_count < 2) {
     return ORB_OK;
   }
-  orb_map_guide guide = {.from = ORB_MAP_FROM_PINS,
-                         .springs = {.moving = ORB_NEW(ctx, int32_t, soft),
-                                     .fixed = ORB_NEW(ctx, int32_t, soft),
-                                     .weight = ORB_NEW(ctx, double, soft)}};
-  orb_map_springs *springs = &guide.springs;
-  orb_status status = springs->moving && springs->fixed && springs->weight ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_map_guide guide = {.from = ORB_MAP_FROM_PINS};
+  orb_status status = springs_create(ctx, soft, &guide.springs);
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count && status == ORB_OK; s++) {
     double energy[2];
     int improved;
-    set_springs(landmarks, alignment, s, springs);
+    set_springs(landmarks, count, alignment->shapes[0].landmark_vertices, alignment->shapes[s].landmark_vertices,
+                &guide.springs);
     free_landmarks(landmarks, count, &alignment->shapes[s]);
     ORB_GO(status,
            orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], 0, count, &guide, preset, energy, &improved),
@@ -125,9 +142,7 @@ static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, orb_pr
   free_landmarks(landmarks, count, &alignment->shapes[0]);
   alignment->energy = sum / (alignment->shape_count - 1);
 end:
-  orb_free(ctx, springs->moving);
-  orb_free(ctx, springs->fixed);
-  orb_free(ctx, springs->weight);
+  springs_free(ctx, &guide.springs);
   return status;
 }
 
@@ -166,26 +181,115 @@ end:
   return status;
 }
 
-/* Composes the map to shape s towards a match that agrees with the landmarks, without them, and then with them pinned.
- * *energy: INFINITY if there is no such match, or no such map. */
+/* Orders the landmarks so that each is as far as possible from those before it, on the first shape. vertex: theirs on
+ * two shapes. O(landmarks²). */
+static orb_status spread_landmarks(orb_context *ctx, const double *positions, int32_t count, int32_t *vertex[2]) {
+  double *far = ORB_NEW(ctx, double, count);
+  if (!far) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    int32_t best = i;
+    for (int32_t l = i; l < count; l++) {
+      const double *p = positions + 3 * (size_t)vertex[0][l];
+      far[l] = i == 0 ? INFINITY : fmin(far[l], orb_distance2(p, positions + 3 * (size_t)vertex[0][i - 1]));
+      best = far[l] > far[best] ? l : best;
+    }
+    far[best] = far[i];
+    for (int s = 0; s < 2; s++) {
+      const int32_t chosen = vertex[s][best];
+      vertex[s][best] = vertex[s][i];
+      vertex[s][i] = chosen;
+    }
+  }
+  orb_free(ctx, far);
+  return ORB_OK;
+}
+
+/* Moves landmarks to their partners, which the map as given takes them near: first `some`, which are far from each
+ * other, then twice as many, and so on. Those in between have then moved with them, and their own ways are short. A
+ * step that fails leaves the map as it was, and its landmarks to the next one. *energy: INFINITY if the last one fails.
+ */
+static orb_status move_in_steps(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int32_t count,
+                                int32_t some, orb_preset preset, double *energy) {
+  const orb_map_guide near = {.from = ORB_MAP_FROM_NEAR};
+  for (int last = 0; !last; some *= 2) {
+    double energies[2];
+    int improved;
+    last = some >= count;
+    ORB_TRY(orb_compose(ctx, fixed, moving, 0, last ? count : some, &near, preset, energies, &improved));
+    *energy = improved ? energies[1] : INFINITY;
+  }
+  return ORB_OK;
+}
+
+/* Moves all landmarks to their partners at once, which mostly leads to a good map and is quick; where it folds the map,
+ * a few at a time. *energy: INFINITY if neither leads to a map. */
+static orb_status move_near(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int32_t count,
+                            orb_preset preset, double *energy) {
+  const size_t size = 3 * (size_t)moving->mesh.vertex_count;
+  const orb_certificate given = moving->certificate;
+  orb_status status = ORB_E_NO_MEMORY;
+  double *before = ORB_NEW(ctx, double, size), *once = ORB_NEW(ctx, double, size), at_once = INFINITY;
+  if (!before || !once) {
+    goto end;
+  }
+  memcpy(before, moving->points, size * sizeof *before);
+  ORB_GO(status, move_in_steps(ctx, fixed, moving, count, count, preset, &at_once), end);
+  *energy = at_once;
+  if (count <= ORB_FIND_HINT_FEW || at_once <= orb_map_params_of(preset).energy.good) {
+    goto end;
+  }
+  const orb_certificate certified = moving->certificate;
+  memcpy(once, moving->points, size * sizeof *once);
+  memcpy(moving->points, before, size * sizeof *before);
+  moving->certificate = given;
+  ORB_GO(status, move_in_steps(ctx, fixed, moving, count, ORB_FIND_HINT_FEW, preset, energy), end);
+  if (at_once <= *energy) {
+    memcpy(moving->points, once, size * sizeof *once);
+    moving->certificate = certified;
+    *energy = at_once;
+  }
+end:
+  orb_free(ctx, before);
+  orb_free(ctx, once);
+  return status;
+}
+
+/* Composes the map to shape s towards a match that agrees with a few landmarks, without them, and then with all of them
+ * pinned. *energy: INFINITY if there is no such match, or no such map. */
 static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double stretch,
                                 double *energy) {
   orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
-  const orb_match_hint hint = {a->landmark_count, fixed->landmark_vertices, moving->landmark_vertices, stretch};
-  const orb_map_guide near = {.from = ORB_MAP_FROM_NEAR};
-  orb_match match;
+  const int32_t count = a->landmark_count, few = count < ORB_FIND_HINT_FEW ? count : ORB_FIND_HINT_FEW;
+  int32_t *all[2] = {fixed->landmark_vertices, moving->landmark_vertices};
+  int32_t *vertex[2] = {ORB_NEW(ctx, int32_t, count), ORB_NEW(ctx, int32_t, count)};
+  orb_match match = {0};
   double energies[2];
   int improved;
+  orb_status status = vertex[0] && vertex[1] ? ORB_OK : ORB_E_NO_MEMORY;
   *energy = INFINITY;
-  orb_status status = orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match);
-  if (status == ORB_OK && match.is_found) {
+  if (status != ORB_OK) {
+    goto done;
+  }
+  memcpy(vertex[0], all[0], (size_t)count * sizeof *all[0]);
+  memcpy(vertex[1], all[1], (size_t)count * sizeof *all[1]);
+  ORB_GO(status, spread_landmarks(ctx, fixed->mesh.positions, count, vertex), done);
+  const orb_match_hint hint = {few, vertex[0], vertex[1], stretch};
+  ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match), done);
+  if (match.is_found) {
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE, .target = match.target};
     ORB_GO(status, orb_compose(ctx, fixed, moving, 0, 0, &guide, preset, energies, &improved), done);
-    ORB_GO(status, orb_compose(ctx, fixed, moving, 0, a->landmark_count, &near, preset, energies, &improved), done);
-    *energy = improved ? energies[1] : INFINITY;
+    fixed->landmark_vertices = vertex[0];
+    moving->landmark_vertices = vertex[1];
+    status = move_near(ctx, fixed, moving, count, preset, energy);
+    fixed->landmark_vertices = all[0];
+    moving->landmark_vertices = all[1];
   }
 done:
   orb_match_free(ctx, &match);
+  orb_free(ctx, vertex[0]);
+  orb_free(ctx, vertex[1]);
   return status;
 }
 
@@ -263,6 +367,66 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
   }
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
+/* Refines the map of the copy of shape s, and puts the whole shape in the copy's place. *energy: INFINITY if there is
+ * no map; both shapes then stay what they are. */
+static orb_status lift_shape(orb_context *ctx, orb_copied_shape *copied, const orb_landmark *landmarks, int32_t s,
+                             orb_preset preset, orb_alignment *alignment, double *energy) {
+  const int32_t count = alignment->landmark_count;
+  orb_aligned_shape *fixed = &alignment->shapes[0], *whole = &copied->whole;
+  orb_map_guide guide = {
+      .from = ORB_MAP_FROM_COPY,
+      .copy = {copied->copy.mesh.vertex_count, copied->copy.vertex, alignment->shapes[s].points, &copied->hierarchy}};
+  double energies[2];
+  int improved = 0;
+  orb_status status;
+  ORB_GO(status, springs_create(ctx, count_soft(landmarks, count), &guide.springs), end);
+  set_springs(landmarks, count, fixed->landmark_vertices, whole->landmark_vertices, &guide.springs);
+  free_landmarks(landmarks, count, whole);
+  ORB_GO(status, orb_compose(ctx, fixed, whole, 0, count, &guide, preset, energies, &improved), end);
+  *energy = improved ? energies[1] : INFINITY;
+  if (improved) {
+    orb_aligned_shape_free(ctx, &alignment->shapes[s]);
+    alignment->shapes[s] = *whole;
+    memset(whole, 0, sizeof *whole);
+  }
+end:
+  springs_free(ctx, &guide.springs);
+  return status;
+}
+
+/* The places of alternatives are at vertices of the copies, and come to lie at the same vertices of the whole shapes.
+ */
+static orb_status lift_alternatives(orb_context *ctx, const orb_copies *copies, orb_alignment *alignment) {
+  for (int32_t i = 0; i < alignment->alternative_count; i++) {
+    orb_alternative *one = &alignment->alternatives[i];
+    for (int32_t k = 0; k < one->count * alignment->shape_count; k++) {
+      ORB_TRY(orb_copies_lift_vertex(ctx, copies, k % alignment->shape_count, &one->at[k]));
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, orb_preset preset,
+                          orb_alignment *alignment, int *lifted) {
+  double sum = 0;
+  orb_status status;
+  *lifted = 0;
+  ORB_GO(status, lift_alternatives(ctx, copies, alignment), end);
+  for (int32_t s = 1; s < alignment->shape_count && sum < INFINITY; s++) {
+    double energy = INFINITY;
+    ORB_GO(status, lift_shape(ctx, &copies->of[s], landmarks, s, preset, alignment, &energy), end);
+    sum += energy;
+  }
+  free_landmarks(landmarks, alignment->landmark_count, &alignment->shapes[0]);
+  alignment->energy = sum / (alignment->shape_count - 1);
+  *lifted = sum < INFINITY;
+end:
+  if (!*lifted) {
+    orb_alignment_free(ctx, alignment);
   }
   return status;
 }

@@ -14,7 +14,7 @@
  *            (find/suspects.h)
  *   given.c  one method with the given landmarks, then the composed map; soft landmarks are let go at the end
  *   auto.c   method `auto`: the rotation search, composed towards the matches of find/
- *   align.c  orb_align(): checks the request and chooses between given.c and auto.c
+ *   align.c  orb_align(): checks the request, chooses between given.c and auto.c, and aligns copies of large shapes
  *
  * The main header of each folder says what comes in, what goes out, and in which order to read its files:
  * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, find/match.h.
@@ -23,6 +23,7 @@
 #define ORB_ALIGN_METHODS_H
 
 #include "align/map/compose.h"
+#include "align/sheet/copies.h"
 
 /* orb_align() for one method with the given landmarks; `auto` without landmarks is the rotation search here. */
 ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -34,8 +35,16 @@ ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shap
 ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,
                                           const double *const *targets, orb_preset preset);
 
-/* Method `auto` without landmarks; auto.c describes it. */
+/* Method `auto` without landmarks; auto.c describes it. The found landmarks and the confidence of the match are left to
+ * the caller. */
 ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                          const orb_align_options *options, orb_alignment *out);
+
+/* Takes an alignment of copies to the whole shapes. landmarks: the caller's, on the given meshes. The maps of the
+ * copies are refined, and soft landmarks are held by their springs. The alternatives become places on the given meshes.
+ * *lifted 0: a map folds at the level of its copy, and `alignment` is empty. `copies` is spent in any case; the caller
+ * frees it. */
+ORB_MUST_CHECK orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks,
+                                         orb_preset preset, orb_alignment *alignment, int *lifted);
 
 #endif

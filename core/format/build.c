@@ -55,7 +55,8 @@ orb_status orb_build_grow(orb_context *ctx, void *array, int64_t *room, int64_t 
     return ORB_OK;
   }
   if (need > INDEX_MAX * 3) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE, "The file has more than %lld elements of one kind.", (long long)INDEX_MAX);
+    return orb_fail(ctx, ORB_E_TOO_LARGE, "The file has more than %lld elements of one kind; decimate the mesh first.",
+                    (long long)INDEX_MAX);
   }
   ORB_TRY(orb_context_check(ctx));
   int64_t wanted = *room + *room / 2 < 1024 ? 1024 : *room + *room / 2;
@@ -72,7 +73,8 @@ orb_status orb_build_grow(orb_context *ctx, void *array, int64_t *room, int64_t 
 orb_status orb_build_vertex(orb_build *build, const double position[3]) {
   if (build->vertices >= build->vertex_room) {
     if (build->vertices >= INDEX_MAX) {
-      return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The file has more than %lld vertices.", (long long)INDEX_MAX);
+      return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The file has more than %lld vertices; decimate the mesh first.",
+                      (long long)INDEX_MAX);
     }
     ORB_TRY(
         orb_build_grow(build->ctx, &build->positions, &build->vertex_room, build->vertices + 1, 3 * sizeof(double)));
@@ -159,7 +161,12 @@ orb_status orb_build_corner(orb_build *build, orb_corner corner, int64_t where) 
 orb_status orb_build_face_end(orb_build *build, int64_t corners) {
   ORB_ASSERT(corners >= 3);
   build->triangles += corners - 2;
-  if (build->triangles > build->max_triangles || corners > ORB_FACE_CORNERS_MAX) {
+  if (corners > ORB_FACE_CORNERS_MAX) {
+    return orb_fail(build->ctx, ORB_E_TOO_LARGE,
+                    "A face has %lld corners, and at most %d are accepted; cut it into triangles before the export.",
+                    (long long)corners, ORB_FACE_CORNERS_MAX);
+  }
+  if (build->triangles > build->max_triangles) {
     return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The mesh has more than %lld triangles, the limit; decimate it first.",
                     (long long)build->max_triangles);
   }
@@ -210,7 +217,8 @@ orb_status orb_build_use_material(orb_build *build, const unsigned char *name, s
     }
   }
   if (build->material_count >= ORB_MATERIALS_MAX) {
-    return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The file names more than %d materials.", ORB_MATERIALS_MAX);
+    return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The file names more than %d materials; export it with fewer.",
+                    ORB_MATERIALS_MAX);
   }
   ORB_TRY(orb_build_grow(build->ctx, &build->materials, &build->materials_room, build->material_count + 1,
                          sizeof(orb_material)));
@@ -250,8 +258,15 @@ orb_status orb_build_object(orb_build *build, const unsigned char *name, size_t 
   if (build->object_count > 0 && build->objects[build->object_count - 1].first_triangle == build->triangles) {
     build->object_count--; /* it has no faces */
   }
-  if (build->object_count == ORB_MATERIALS_MAX) {
+  if (build->object_count > ORB_OBJECTS_MAX) {
     return ORB_OK;
+  }
+  if (build->object_count == ORB_OBJECTS_MAX) {
+    length = 0; /* all further faces belong to one without a name */
+    if (!build->objects_dropped) {
+      ORB_TRY(orb_build_drop(build, "names of objects", "", "A mesh keeps the names of its first 65,536 objects."));
+      build->objects_dropped = 1;
+    }
   }
   ORB_TRY(
       orb_build_grow(build->ctx, &build->objects, &build->object_room, build->object_count + 1, sizeof(orb_object)));

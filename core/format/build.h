@@ -11,7 +11,8 @@
 
 enum {
   ORB_FACE_CORNERS_MAX = 1 << 24, /* corners of one face; bounds the scratch memory that cutting it takes */
-  ORB_MATERIALS_MAX = 65536       /* materials of a file; bounds the hash table of their names */
+  ORB_MATERIALS_MAX = 65536,      /* materials of a file; bounds the hash table of their names */
+  ORB_OBJECTS_MAX = 65536         /* objects that keep their names; bounds the memory for them */
 };
 
 /* One corner of a face, 0-based; −1: none. */
@@ -47,6 +48,7 @@ typedef struct orb_build {
   int32_t dropped_count;
   orb_object *objects; /* first_triangle counts triangles, as polygons are cut later into size − 2 each */
   int64_t object_count, object_room;
+  int objects_dropped;                                      /* the file has more than ORB_OBJECTS_MAX */
   int64_t highest_vertex, highest_texcoord, highest_normal; /* indices that a face names, and where: line or offset */
   int64_t highest_vertex_where, highest_texcoord_where, highest_normal_where;
 } orb_build;

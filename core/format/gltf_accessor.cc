@@ -168,7 +168,12 @@ Numbers Buffers::accessor(int64_t index, size_t *width) const {
     return values->list;
   }
   std::string shape = text_of(a, "type");
-  *width = shape == "SCALAR" ? 1 : shape == "VEC2" ? 2 : shape == "VEC3" ? 3 : shape == "VEC4" ? 4 : 0;
+  *width = shape == "SCALAR" ? 1
+           : shape == "VEC2" ? 2
+           : shape == "VEC3" ? 3
+           : shape == "VEC4" ? 4
+           : shape == "MAT4" ? 16
+                             : 0;
   if (*width == 0) {
     malformed("A glTF accessor of a mesh has the type \"" + shape.substr(0, 16) + "\".");
   }

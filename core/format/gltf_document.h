@@ -6,6 +6,7 @@
 
 /* Numbers that glTF 2.0 assigns. */
 enum {
+  ORB_GLTF_UBYTE = 5121,
   ORB_GLTF_USHORT = 5123,
   ORB_GLTF_UINT = 5125,
   ORB_GLTF_FLOAT = 5126,

@@ -113,25 +113,40 @@ Editor::Editor(orb_context *ctx, cJSON *doc, Bytes first)
       view_count_(cJSON_GetArraySize(views_)),
       first_(first) {}
 
-int64_t Editor::add(const Floats &values, size_t width, bool attribute, bool bounded) {
-  static const char *const types[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
-  size_t start = first_.size + padding(first_.size) + added_.size;
+int64_t Editor::add_view(const void *bytes, size_t size, int target) {
+  static const unsigned char zeros[4] = {0, 0, 0, 0};
   must(orb_context_check(ctx_));
-  must(orb_buffer_append(ctx_, &added_, values.data(), values.size() * sizeof(float)));
+  must(orb_buffer_append(ctx_, &added_, zeros, padding(added_.size)));
+  size_t start = first_.size + padding(first_.size) + added_.size;
+  must(orb_buffer_append(ctx_, &added_, bytes, size));
   cJSON *view = made(cJSON_CreateObject());
   append(views_, view);
   set(view, "buffer", 0.0);
   set(view, "byteOffset", static_cast<double>(start));
-  set(view, "byteLength", static_cast<double>(values.size() * sizeof(float)));
-  if (attribute) {
-    set(view, "target", static_cast<double>(ORB_GLTF_ARRAY_BUFFER));
+  set(view, "byteLength", static_cast<double>(size));
+  if (target) {
+    set(view, "target", static_cast<double>(target));
   }
+  return view_count_++;
+}
+
+int64_t Editor::add_list(const void *bytes, size_t size, int component_type, size_t count, const char *type,
+                         bool attribute) {
+  int64_t view = add_view(bytes, size, attribute ? ORB_GLTF_ARRAY_BUFFER : 0);
   cJSON *accessor = made(cJSON_CreateObject());
   append(accessors_, accessor);
-  set(accessor, "bufferView", static_cast<double>(view_count_++));
-  set(accessor, "componentType", static_cast<double>(ORB_GLTF_FLOAT));
-  set(accessor, "count", static_cast<double>(values.size() / width));
-  set(accessor, "type", cJSON_CreateString(types[width - 1]));
+  set(accessor, "bufferView", static_cast<double>(view));
+  set(accessor, "componentType", static_cast<double>(component_type));
+  set(accessor, "count", static_cast<double>(count));
+  set(accessor, "type", cJSON_CreateString(type));
+  return accessor_count_++;
+}
+
+int64_t Editor::add(const Floats &values, size_t width, bool attribute, bool bounded) {
+  static const char *const types[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
+  int64_t number = add_list(values.data(), values.size() * sizeof(float), ORB_GLTF_FLOAT, values.size() / width,
+                            types[width - 1], attribute);
+  cJSON *accessor = cJSON_GetArrayItem(accessors_, static_cast<int>(number));
   if (bounded) {
     double low[4], high[4];
     for (size_t k = 0; k < width; k++) {
@@ -146,7 +161,7 @@ int64_t Editor::add(const Floats &values, size_t width, bool attribute, bool bou
     set(accessor, "min", cJSON_CreateDoubleArray(low, static_cast<int>(width)));
     set(accessor, "max", cJSON_CreateDoubleArray(high, static_cast<int>(width)));
   }
-  return accessor_count_++;
+  return number;
 }
 
 void Editor::write(orb_buffer *out) {
@@ -168,6 +183,7 @@ void Editor::write(orb_buffer *out) {
   must(orb_buffer_append(ctx_, out, first_.at, first_.size));
   must(orb_buffer_append(ctx_, out, zeros, padding(first_.size)));
   must(orb_buffer_append(ctx_, out, added_.data, added_.size));
+  must(orb_buffer_append(ctx_, out, zeros, padding(binary)));
 }
 
 }  // namespace gltf

@@ -44,6 +44,12 @@ class Editor {
    * min and max. */
   int64_t add(const Floats &values, size_t width, bool attribute, bool bounded);
 
+  /* Adds an accessor of a glTF type such as "MAT4" over any bytes; returns its number. */
+  int64_t add_list(const void *bytes, size_t size, int component_type, size_t count, const char *type, bool attribute);
+
+  /* Adds a view; returns its number. target 0: none. */
+  int64_t add_view(const void *bytes, size_t size, int target);
+
   /* Appends the GLB. */
   void write(orb_buffer *out);
 

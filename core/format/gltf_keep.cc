@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 
+#include "format/gltf_blocks.hh"
 #include "format/gltf_named.hh"
 #include "format/gltf_parse.hh"
 #include "format/gltf_scene.hh"
@@ -82,11 +83,6 @@ struct Keeper {
     const cJSON *accessor =
         index == NONE ? nullptr : cJSON_GetArrayItem(member(doc, "accessors"), static_cast<int>(index));
     return static_cast<size_t>(whole(accessor, "count", 0));
-  }
-
-  static bool is_surface(const cJSON *primitive) {
-    int64_t mode = whole(primitive, "mode", 4);
-    return mode >= 4 && mode <= 6 && member(member(primitive, "attributes"), "POSITION");
   }
 
   /* Whether one of `count` vertices from `from` is on the surface. */

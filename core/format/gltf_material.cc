@@ -423,7 +423,7 @@ void Materials::load(const cJSON *doc) {
   image_number_.assign(images_.size(), -1);
   image_fault_.assign(images_.size(), nullptr);
   if (materials.size() > ORB_MATERIALS_MAX) {
-    throw Fault{ORB_E_TOO_LARGE, "The glTF file has too many materials."};
+    throw Fault{ORB_E_TOO_LARGE, "The glTF file has more than 65,536 materials; export it with fewer."};
   }
   must(orb_build_grow(ctx_, &build_->materials, &build_->materials_room, static_cast<int64_t>(materials.size()) + 1,
                       sizeof(orb_material)));

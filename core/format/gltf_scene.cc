@@ -2,8 +2,6 @@
 
 namespace gltf {
 
-namespace {
-
 Matrix operator*(const Matrix &a, const Matrix &b) {
   if (a.identity) {
     return b;
@@ -54,8 +52,6 @@ int64_t number_of(const cJSON *value) {
   }
   return static_cast<int64_t>(value->valuedouble);
 }
-
-}  // namespace
 
 std::vector<std::pair<int64_t, Matrix>> shown_meshes(const cJSON *doc, size_t mesh_count) {
   const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");

@@ -41,6 +41,14 @@ struct Matrix {
   }
 };
 
+Matrix operator*(const Matrix &a, const Matrix &b);
+
+/* The transform of a node to its parent. */
+Matrix matrix_of(const cJSON *node);
+
+/* The number of a node in a list of them. */
+int64_t number_of(const cJSON *value);
+
 /* Mesh number and matrix of each node of the scene that shows a mesh, in depth-first order from the roots. Without
  * nodes and scenes: each of the mesh_count meshes once. */
 std::vector<std::pair<int64_t, Matrix>> shown_meshes(const cJSON *doc, size_t mesh_count);

@@ -10,6 +10,7 @@ typedef struct obj_reader {
   orb_build build;
   orb_text text;
   int has_objects; /* an "o" has been read */
+  int has_library; /* a "mtllib" has been noted */
 } obj_reader;
 
 static orb_status malformed(obj_reader *r, const char *what) {
@@ -197,7 +198,8 @@ static orb_status read_line(obj_reader *r) {
     r->text.at += length;
     return read_usemtl(r);
   }
-  if (orb_text_is(&r->text, "mtllib") && r->build.dropped_count == 0) {
+  if (orb_text_is(&r->text, "mtllib") && !r->has_library) {
+    r->has_library = 1;
     ORB_TRY(note_library(r));
   }
   if (*p < ' ' || *p == 127) {

@@ -7,6 +7,8 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "carry/carry.h"
+#include "merge/coarse.h"
 #include "merge/report.h"
 #include "mesh/refuse.h"
 #include "transfer/holes.h"
@@ -22,6 +24,7 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_alignment_free(ctx, &result->alignment);
   orb_supermesh_free(ctx, &result->supermesh);
   orb_free(ctx, result->shapes);
+  orb_free(ctx, result->coarse);
   orb_free(ctx, result->landmark_residuals);
   orb_free(ctx, result->found_residuals);
   orb_free(ctx, result->found_names);
@@ -31,13 +34,15 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_free(ctx, result->fits);
   orb_free(ctx, result->asset_vertices);
   orb_free(ctx, result->dropped);
+  orb_free(ctx, result->carried);
   orb_buffer_free(ctx, &result->asset);
   memset(result, 0, sizeof *result);
 }
 
 static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
-                                   orb_remesh_method method, orb_merge_result *out) {
-  const int32_t *number = method == ORB_REMESH_TEMPLATE ? shapes[0].mesh->source_triangle : NULL;
+                                   const orb_remesh_options *remesh, orb_merge_result *out) {
+  int is_template = remesh->method == ORB_REMESH_TEMPLATE;
+  const int32_t *number = is_template ? shapes[0].mesh->source_triangle : NULL;
   int32_t shape_count = out->supermesh.shape_count;
   out->shapes = ORB_NEW0(ctx, orb_shape_report, shape_count);
   if (!out->shapes) {
@@ -47,6 +52,9 @@ static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shap
   for (int32_t s = 0; s < shape_count; s++) {
     ORB_TRY(orb_shape_measure(ctx, &out->alignment.shapes[s], &out->supermesh, s, &out->shapes[s]));
     orb_progress(ctx, "transfer", 0.8 * (s + 1) / shape_count);
+  }
+  if (is_template) {
+    ORB_TRY(orb_report_coarse(ctx, number, remesh->tolerance, out));
   }
   ORB_TRY(orb_report_landmarks(ctx, shapes, landmarks, out));
   ORB_TRY(orb_report_found(ctx, shapes, out));
@@ -69,6 +77,54 @@ static orb_status check_shapes(orb_context *ctx, const orb_align_shape *shapes, 
   return ORB_OK;
 }
 
+/* Writes the GLB by the method's own way. */
+static orb_status write_glb(orb_context *ctx, const orb_align_shape *given, const char *const *names,
+                            const orb_merge_options *options, const orb_asset_options *asset, orb_merge_result *out) {
+  const orb_aligned_shape *shapes = out->alignment.shapes;
+  if (out->is_document) {
+    orb_document document = {options->file, options->file_bytes, options->file_size, options->file_parts};
+    return orb_asset_write_document(ctx, &out->supermesh, shapes, &document, names, asset, &out->asset_facts,
+                                    &out->asset, &out->asset_vertices, &out->dropped, &out->dropped_count);
+  }
+  if (options->remesh.method == ORB_REMESH_TEMPLATE) {
+    return orb_asset_write_template(ctx, &out->supermesh, shapes, options->file ? options->file : given[0].mesh, names,
+                                    asset, &out->asset_facts, &out->asset, &out->asset_vertices);
+  }
+  return orb_asset_write_mapped(ctx, &out->supermesh, shapes, names, asset, &out->asset_facts, &out->asset,
+                                &out->asset_vertices);
+}
+
+/* Writes the GLB, and carries onto it what the options ask for. */
+static orb_status write_carried(orb_context *ctx, const orb_align_shape *given, const char *const *names,
+                                const orb_merge_options *options, orb_merge_result *out) {
+  orb_carry_job job = {.supermesh = &out->supermesh,
+                       .shapes = out->alignment.shapes,
+                       .given = given,
+                       .files = options->files,
+                       .names = names,
+                       .carries = options->carries,
+                       .carry_count = options->carry_count,
+                       .fit = options->asset.fit,
+                       .is_document = out->is_document};
+  orb_carrier carrier;
+  orb_asset_options asset = options->asset;
+  orb_status status;
+  ORB_GO(status, orb_carrier_open(ctx, &job, &carrier), done);
+  asset.splits = carrier.splits;
+  asset.split_count = carrier.set_count;
+  asset.targets = carrier.targets;
+  asset.target_count = carrier.target_count;
+  ORB_GO(status, write_glb(ctx, given, names, options, &asset, out), done);
+  ORB_GO(status,
+         orb_carrier_add(ctx, &carrier, out->asset_vertices, out->asset_facts.vertex_count, &out->asset, &out->carried,
+                         &out->carried_count),
+         done);
+  out->has_profiles = !out->is_document && !orb_carrier_edits(&carrier);
+done:
+  orb_carrier_free(ctx, &carrier);
+  return status;
+}
+
 static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, int32_t shape_count,
                               const char *const *names, const orb_merge_options *options, orb_merge_result *out) {
   const orb_aligned_shape *shapes = out->alignment.shapes;
@@ -78,17 +134,7 @@ static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, in
     return orb_fail(ctx, ORB_E_BAD_OPTION,
                     "\"template\" names meshes or nodes, but the first shape is not glTF; leave that member out.");
   }
-  if (out->is_document) {
-    orb_document document = {options->file, options->file_bytes, options->file_size, options->file_parts};
-    ORB_TRY(orb_asset_write_document(ctx, &out->supermesh, shapes, &document, names, &options->asset, &out->asset_facts,
-                                     &out->asset, &out->asset_vertices, &out->dropped, &out->dropped_count));
-  } else if (options->remesh.method == ORB_REMESH_TEMPLATE) {
-    ORB_TRY(orb_asset_write_template(ctx, &out->supermesh, shapes, options->file ? options->file : given[0].mesh, names,
-                                     &options->asset, &out->asset_facts, &out->asset, &out->asset_vertices));
-  } else {
-    ORB_TRY(orb_asset_write_mapped(ctx, &out->supermesh, shapes, names, &options->asset, &out->asset_facts, &out->asset,
-                                   &out->asset_vertices));
-  }
+  ORB_TRY(write_carried(ctx, given, names, options, out));
   if (!out->is_document) {
     ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
   }
@@ -101,7 +147,8 @@ static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, in
     return ORB_E_NO_MEMORY;
   }
   ORB_TRY(orb_asset_transforms(ctx, &out->supermesh, shapes, options->asset.fit, out->transforms, out->fits));
-  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES && !out->is_document; p++) {
+  ORB_TRY(orb_carried_settle(ctx, out->carried, out->carried_count, &out->dropped, &out->dropped_count));
+  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES && out->has_profiles; p++) {
     ORB_TRY(orb_profile_write(ctx, out->asset.data, out->asset.size, (orb_profile)p, &out->profiles[p], NULL));
   }
   return ORB_OK;
@@ -128,7 +175,7 @@ orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, co
          fail);
   out->timings.remesh = (now = orb_clock()) - mark;
   mark = now;
-  ORB_GO(status, transfer_reports(ctx, shapes, landmarks, remesh.method, out), fail);
+  ORB_GO(status, transfer_reports(ctx, shapes, landmarks, &remesh, out), fail);
   out->timings.transfer = (now = orb_clock()) - mark;
   mark = now;
   ORB_GO(status, write_asset(ctx, shapes, shape_count, names, options, out), fail);

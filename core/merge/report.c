@@ -199,13 +199,13 @@ static double quality(const double *positions, const int32_t *corner) {
   return edges > 0 ? 3.4641016151377544 * orb_length(normal) / edges : 0;
 }
 
-/* Lists the triangles that are no slivers on either shape: a sliver's stretch is mostly rounding, and one sliver can
- * outweigh all other triangles in a mean. If less than a tenth is left, lists all. */
-static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, const double *b, int32_t *out) {
+/* Lists the triangles that are no slivers on `least` of the two shapes: a sliver's stretch is mostly rounding, and one
+ * sliver can outweigh all other triangles in a mean. If less than a tenth is left, lists all. */
+static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, const double *b, int least, int32_t *out) {
   int32_t count = 0;
   for (int64_t t = 0; t < supermesh->triangle_count; t++) {
     const int32_t *corner = supermesh->triangles + 3 * t;
-    if (quality(a, corner) >= SLIVER && quality(b, corner) >= SLIVER) {
+    if ((quality(a, corner) >= SLIVER) + (quality(b, corner) >= SLIVER) >= least) {
       memcpy(out + 3 * (int64_t)count++, corner, 3 * sizeof *corner);
     }
   }
@@ -216,7 +216,7 @@ static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, con
   return count;
 }
 
-/* Appends the warnings of a pair. triangles: those that its distortion is measured on. */
+/* Appends the warnings of a pair. */
 static orb_status warn_of_pair(orb_context *ctx, orb_merge_result *out, const orb_warn_pair *map, int32_t a,
                                int32_t b) {
   for (int kind = ORB_WARNING_STRETCHED; kind <= ORB_WARNING_THIN; kind++) {
@@ -273,10 +273,12 @@ static orb_status measure_pair(orb_context *ctx, orb_merge_result *out, double *
   if (!shapely) {
     return ORB_E_NO_MEMORY;
   }
-  int32_t count = keep_shapely(supermesh, positions[pair->a], positions[pair->b], shapely);
+  int32_t count = keep_shapely(supermesh, positions[pair->a], positions[pair->b], 2, shapely);
   orb_status status =
       orb_distortion_measure(ctx, positions[pair->a], positions[pair->b], shapely, count, &pair->distortion);
   if (status == ORB_OK) {
+    /* A sliver on one shape alone is where the map crushed a triangle. */
+    count = keep_shapely(supermesh, positions[pair->a], positions[pair->b], 1, shapely);
     const orb_warn_pair map = {.triangles = shapely,
                                .triangle_count = count,
                                .vertex_count = supermesh->vertex_count,

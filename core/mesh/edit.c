@@ -83,7 +83,7 @@ orb_status orb_mesh_reserve(orb_context *ctx, orb_mesh *mesh, int32_t more_verti
   size_t v = (size_t)mesh->vertex_count + (size_t)more_vertices;
   size_t t = (size_t)mesh->triangle_count + (size_t)more_triangles;
   if (3 * v > INT32_MAX || 3 * t > INT32_MAX) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE, "The repaired mesh would be too large.");
+    return orb_fail(ctx, ORB_E_TOO_LARGE, "The repaired mesh would be too large; decimate it first.");
   }
   int good = regrow(ctx, &mesh->positions, 3 * v, sizeof(double), more_vertices) &&
              regrow(ctx, &mesh->source, v, sizeof(int32_t), more_vertices) &&

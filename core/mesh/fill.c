@@ -161,7 +161,8 @@ static orb_status add_patch(fill *f, const orb_patch *patch) {
   orb_mesh *mesh = f->s->mesh;
   const int32_t first = mesh->vertex_count - patch->rim; /* of the mesh: the patch's vertex 0, had its rim been new */
   if (patch->triangle_count + f->later > INT32_MAX - mesh->triangle_count) {
-    return orb_fail(f->s->ctx, ORB_E_TOO_LARGE, "The mesh would be too large with its holes filled.");
+    return orb_fail(f->s->ctx, ORB_E_TOO_LARGE,
+                    "The mesh would be too large with its holes filled; decimate it first.");
   }
   ORB_TRY(orb_mesh_reserve(f->s->ctx, mesh, patch->vertex_count + (int32_t)f->later,
                            patch->triangle_count + (int32_t)f->later));
@@ -276,7 +277,7 @@ static orb_status run(fill *f, orb_fill how, int64_t *count) {
   const int32_t faces = mesh->triangle_count, vertices = mesh->vertex_count;
   ORB_TRY(orb_surface_loops(s, &loops));
   if (3 * (faces + open) > INT32_MAX) {
-    return orb_fail(s->ctx, ORB_E_TOO_LARGE, "The mesh would be too large with its holes filled.");
+    return orb_fail(s->ctx, ORB_E_TOO_LARGE, "The mesh would be too large with its holes filled; decimate it first.");
   }
   f->loop = ORB_NEW(s->ctx, int32_t, open);
   f->vertex = ORB_NEW(s->ctx, int32_t, open);

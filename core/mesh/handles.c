@@ -140,7 +140,7 @@ static orb_status cut(orb_surface *s, const orb_cycles *cycles, int fans, double
     area[i] = 0;
   }
   if (more > INT32_MAX - mesh->vertex_count) {
-    return orb_fail(s->ctx, ORB_E_TOO_LARGE, "The repaired mesh would be too large.");
+    return orb_fail(s->ctx, ORB_E_TOO_LARGE, "The repaired mesh would be too large; decimate it first.");
   }
   ORB_TRY(orb_mesh_reserve(s->ctx, mesh, (int32_t)more, 0));
   int32_t old = mesh->triangle_count;

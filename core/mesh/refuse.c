@@ -248,7 +248,9 @@ orb_status orb_refuse_size(orb_context *ctx, const orb_mesh *mesh) {
 }
 
 orb_status orb_refuse_few(orb_surface *s) {
-  return orb_fail(s->ctx, ORB_E_DEGENERATE,
-                  "%d %s left once repeated and degenerate faces are dropped; a closed surface needs four.",
-                  s->mesh->triangle_count, plural(s->mesh->triangle_count, "triangle is", "triangles are"));
+  return orb_fail(
+      s->ctx, ORB_E_DEGENERATE,
+      "%d %s left once repeated and degenerate faces are dropped; a closed surface needs four. Check that the right "
+      "object was exported, and that no other program has merged its vertices.",
+      s->mesh->triangle_count, plural(s->mesh->triangle_count, "triangle is", "triangles are"));
 }

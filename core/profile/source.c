@@ -129,11 +129,11 @@ static orb_status read_tables(orb_context *ctx, orb_source *source, const unsign
   return ORB_OK;
 }
 
-/* Whether a document was uploaded and got targets: see orb_asset_write_document(). */
-static int is_kept(const cJSON *document) {
+/* Whether a mesh has such a member in its extras. */
+static int has_extra(const cJSON *document, const char *name) {
   const cJSON *mesh;
   cJSON_ArrayForEach(mesh, cJSON_GetObjectItemCaseSensitive(document, "meshes")) {
-    if (cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(mesh, "extras"), "firstShape")) {
+    if (cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(mesh, "extras"), name)) {
       return 1;
     }
   }
@@ -152,9 +152,13 @@ orb_status orb_source_open(orb_context *ctx, const unsigned char *bytes, size_t 
   if (!out->document && orb_json_begins(json, json_size)) {
     return orb_fail(ctx, ORB_E_NO_MEMORY, "There is not enough memory to read the asset.");
   }
-  if (is_kept(out->document)) {
+  if (has_extra(out->document, "firstShape")) { /* see orb_asset_write_document() */
     return orb_fail(ctx, ORB_E_BAD_OPTION,
                     "This asset is the uploaded document with targets, which has the profile float only.");
+  }
+  if (has_extra(out->document, "transferred")) { /* see orb_carry */
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "This asset has what \"transfer\" took from its shapes, so it has the profile float only.");
   }
   return out->document ? read_tables(ctx, out, binary, binary_size) : orb_source_corrupt(ctx);
 }

@@ -16,6 +16,7 @@
 #include "transfer/path.h"
 #include "transfer/split.h"
 #include "transfer/tangent.h"
+#include "transfer/targets.h"
 #include "transfer/template.h"
 #include "transfer/texcoord.h"
 
@@ -65,6 +66,13 @@ static void draft_free(orb_context *ctx, orb_draft *draft) {
   orb_free(ctx, draft->tangents);
   orb_free(ctx, draft->home);
   orb_free(ctx, draft->parts);
+}
+
+/* Adds in-betweens and targets to the shapes. */
+static void count_frames(orb_draft *draft) {
+  const orb_asset_options *options = draft->options;
+  draft->between_count = options->path == ORB_PATH_RIGID ? options->path_steps * (draft->shape_count - 1) : 0;
+  draft->frame_count = draft->shape_count + draft->between_count + options->target_count;
 }
 
 static orb_status allocate_frames(orb_context *ctx, orb_draft *draft) {
@@ -220,15 +228,14 @@ orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *superme
                      .shape_count = supermesh->shape_count,
                      .frame_count = supermesh->shape_count};
   orb_status status;
-  if (options->path == ORB_PATH_RIGID) {
-    draft.frame_count += options->path_steps * (supermesh->shape_count - 1);
-  }
+  count_frames(&draft);
   orb_progress(ctx, "write", 0);
   ORB_GO(status, allocate_frames(ctx, &draft), done);
   ORB_GO(status, make_shapes(ctx, &draft), done);
   ORB_GO(status, make_colors(ctx, &draft), done);
   ORB_GO(status, make_textures(ctx, &draft), done);
   ORB_GO(status, orb_draft_path(ctx, &draft), done);
+  ORB_GO(status, orb_draft_targets(ctx, &draft), done);
   ORB_GO(status, orb_draft_tangents(ctx, &draft), done);
   ORB_GO(status, round_frames(ctx, &draft), done);
   ORB_GO(status, orb_draft_split(ctx, &draft), done);
@@ -266,13 +273,12 @@ static orb_status make_bare_frames(orb_context *ctx, orb_draft *draft, orb_asset
   *bare = *options;
   bare->normals = bare->colors = 0;
   draft->options = bare;
-  if (options->path == ORB_PATH_RIGID) {
-    draft->frame_count += options->path_steps * (draft->shape_count - 1);
-  }
+  count_frames(draft);
   orb_progress(ctx, "write", 0);
   ORB_TRY(allocate_frames(ctx, draft));
   ORB_TRY(make_shapes(ctx, draft));
   ORB_TRY(orb_draft_path(ctx, draft));
+  ORB_TRY(orb_draft_targets(ctx, draft));
   draft->options = options;
   return ORB_OK;
 }

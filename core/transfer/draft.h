@@ -1,6 +1,6 @@
 /* The draft of an asset: what the steps of orb_asset_write() hand to each other.
  *
- *   frames:  the shapes, fitted, and in-betweens, as doubles    (asset.c, path.c)
+ *   frames:  the shapes, fitted, in-betweens, targets, as doubles (asset.c, path.c, targets.c)
  *   rounded: base and deltas as float32, vertices kept distinct (distinct.c)
  *   wedges:  normals, texture coordinates, colours at corners   (wedge.c, texcoord.c, tangent.c)
  *   split:   the vertices of the file, by material              (split.c)
@@ -25,16 +25,17 @@ typedef struct orb_draft {
   const orb_aligned_shape *shapes;
   const orb_asset_options *options;
   int32_t shape_count, frame_count;
-  double **positions;   /* frame_count × 3·vertex_count */
-  float *base;          /* 3·vertex_count */
-  float **deltas;       /* (frame_count − 1) × 3·vertex_count */
-  orb_wedges *normals;  /* frame_count; NULL: none */
-  orb_wedges *colors;   /* shape_count; width 0: none */
-  orb_wedges texcoords; /* of the first shape; width 0: none */
-  orb_wedges *tangents; /* frame_count; NULL: no material needs them */
-  int32_t color_count;  /* frames whose colours are written: 0, 1 or all */
-  int32_t *home;        /* per supermesh triangle: the first shape's triangle that holds its centre; NULL: not needed */
-  int has_holes;        /* triangles whose home fills a hole of the first shape are left out */
+  int32_t between_count; /* frames after the shapes that are in-betweens; then come the targets of the options */
+  double **positions;    /* frame_count × 3·vertex_count */
+  float *base;           /* 3·vertex_count */
+  float **deltas;        /* (frame_count − 1) × 3·vertex_count */
+  orb_wedges *normals;   /* frame_count; NULL: none */
+  orb_wedges *colors;    /* shape_count; width 0: none */
+  orb_wedges texcoords;  /* of the first shape; width 0: none */
+  orb_wedges *tangents;  /* frame_count; NULL: no material needs them */
+  int32_t color_count;   /* frames whose colours are written: 0, 1 or all */
+  int32_t *home; /* per supermesh triangle: the first shape's triangle that holds its centre; NULL: not needed */
+  int has_holes; /* triangles whose home fills a hole of the first shape are left out */
   int32_t part_count;
   orb_draft_part *parts;
   int32_t nudged;

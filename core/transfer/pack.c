@@ -146,7 +146,7 @@ static orb_status add_part(packer *pack, const orb_draft_part *part, orb_gltf_pr
 
 int32_t orb_draft_keys(const orb_draft *draft, int32_t *frames, double *times) {
   int32_t count = 0, legs = 2 * (draft->shape_count - 1);
-  int32_t steps = draft->frame_count > draft->shape_count ? draft->options->path_steps : 0;
+  int32_t steps = draft->between_count > 0 ? draft->options->path_steps : 0;
   for (int32_t leg = 0; leg <= legs; leg++) {
     int32_t shape = leg < draft->shape_count ? leg : legs - leg;
     double start = leg * (HOLD + MOVE);
@@ -194,7 +194,7 @@ done:
 static int32_t make_extras(const orb_asset_facts *facts, const orb_draft *draft, orb_gltf_extra extras[4]) {
   int32_t count = 0;
   extras[count++] = (orb_gltf_extra){"morphedAttributes", NULL, facts->morphed_attributes};
-  if (draft->frame_count > draft->shape_count) {
+  if (draft->between_count > 0) {
     extras[count++] = (orb_gltf_extra){"inBetweens", NULL, draft->options->path_steps};
   }
   if (facts->nudged_vertices > 0) {
@@ -245,9 +245,19 @@ void orb_draft_names(const orb_draft *draft, const char *const *names, orb_targe
     }
     snprintf(texts[s], sizeof texts[s], same ? "%.127s (%d)" : "%.127s", names[s], same + 1);
   }
-  for (int32_t f = shapes; f < draft->frame_count; f++) {
+  for (int32_t f = shapes; f < shapes + draft->between_count; f++) {
     int32_t gap = (f - shapes) / steps, step = (f - shapes) % steps;
     snprintf(texts[f], sizeof texts[f], "%.127s to %.127s %d/%d", names[gap], names[gap + 1], step + 1, steps + 1);
+  }
+  for (int32_t f = shapes + draft->between_count; f < draft->frame_count; f++) {
+    const char *name = draft->options->targets[f - shapes - draft->between_count].name;
+    snprintf(texts[f], sizeof texts[f], "%.127s", name);
+    for (int32_t r = 1, number = 2; r < f; r++) {
+      if (strcmp(texts[r], texts[f]) == 0) {
+        snprintf(texts[f], sizeof texts[f], "%.127s (%d)", name, number++);
+        r = 0; /* the new name may be taken, too */
+      }
+    }
   }
   for (int32_t f = 0; f < draft->frame_count; f++) {
     out[f] = texts[f];

@@ -93,7 +93,7 @@ done:
 }
 
 orb_status orb_draft_path(orb_context *ctx, orb_draft *draft) {
-  for (int32_t gap = 0; draft->frame_count > draft->shape_count && gap + 1 < draft->shape_count; gap++) {
+  for (int32_t gap = 0; draft->between_count > 0 && gap + 1 < draft->shape_count; gap++) {
     ORB_TRY(fill_gap(ctx, draft, gap));
   }
   return ORB_OK;

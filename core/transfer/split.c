@@ -25,7 +25,7 @@ static void add_stream(stream_list *list, const orb_wedges *wedges) {
 
 static orb_status collect_streams(orb_context *ctx, const orb_draft *draft, stream_list *list) {
   list->count = 0;
-  list->of_corner = ORB_NEW(ctx, const int32_t *, 2 * (int64_t)draft->frame_count + 2);
+  list->of_corner = ORB_NEW(ctx, const int32_t *, 2 * (int64_t)draft->frame_count + 2 + draft->options->split_count);
   if (!list->of_corner) {
     return ORB_E_NO_MEMORY;
   }
@@ -38,6 +38,11 @@ static orb_status collect_streams(orb_context *ctx, const orb_draft *draft, stre
   add_stream(list, &draft->texcoords);
   if (draft->tangents) {
     add_stream(list, &draft->tangents[0]); /* the frames share their corners */
+  }
+  for (int32_t i = 0; i < draft->options->split_count; i++) {
+    if (draft->options->splits[i]) {
+      list->of_corner[list->count++] = draft->options->splits[i];
+    }
   }
   return ORB_OK;
 }

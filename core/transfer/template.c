@@ -298,7 +298,8 @@ orb_status orb_template_draft(orb_context *ctx, const orb_draft *draft, const or
                      .shapes = draft->shapes,
                      .options = draft->options,
                      .shape_count = draft->shape_count,
-                     .frame_count = draft->frame_count};
+                     .frame_count = draft->frame_count,
+                     .between_count = draft->between_count};
   if (status == ORB_OK) {
     find_on_supermesh(&m, made);
     ORB_GO(status, make_positions(&m, made, out), done);

@@ -27,7 +27,9 @@ typedef struct texcoord_job {
   const orb_locator *locator;
   const int32_t *twin, *home;
   int32_t *home_out;
-  float *corners; /* 2 a corner of the supermesh */
+  const float *texcoords;  /* 2 a corner of the shape */
+  const int32_t *material; /* of each triangle: where it changes is a seam, too; NULL: there are none */
+  float *corners;          /* 2 a corner of the supermesh */
 } texcoord_job;
 
 static void centre_of(const orb_supermesh *supermesh, int64_t t, double out[3]) {
@@ -81,10 +83,9 @@ static int same_texcoord(const float *texcoords, int32_t g, int32_t h) {
 }
 
 static int is_seam(const texcoord_job *job, int32_t h) {
-  const orb_mesh *mesh = &job->shape->mesh;
   int32_t g = job->twin[h];
-  return (mesh->material && mesh->material[g / 3] != mesh->material[h / 3]) ||
-         !same_texcoord(mesh->texcoords, h, orb_next(g)) || !same_texcoord(mesh->texcoords, orb_next(h), g);
+  return (job->material && job->material[g / 3] != job->material[h / 3]) ||
+         !same_texcoord(job->texcoords, h, orb_next(g)) || !same_texcoord(job->texcoords, orb_next(h), g);
 }
 
 /* The edge over which the straight way from m to p leaves triangle t; −1 if p lies inside. */
@@ -116,7 +117,7 @@ static double fraction_of(double a, double b) {
 
 /* The coordinates at the point where the way from m to p meets half-edge h. */
 static void at_edge(const texcoord_job *job, int32_t h, const double m[3], const double p[3], float out[2]) {
-  const float *texcoords = job->shape->mesh.texcoords;
+  const float *texcoords = job->texcoords;
   int32_t next = orb_next(h);
   double w = fraction_of(fabs(orb_det(m, p, point_of(job, next))), fabs(orb_det(m, p, point_of(job, h))));
   for (int c = 0; c < 2; c++) {
@@ -126,7 +127,7 @@ static void at_edge(const texcoord_job *job, int32_t h, const double m[3], const
 
 /* The coordinates at p inside triangle t. */
 static void at_point(const texcoord_job *job, int32_t t, const double p[3], float out[2]) {
-  const float *texcoords = job->shape->mesh.texcoords;
+  const float *texcoords = job->texcoords;
   double weight[3], sum = 0, value[2] = {0};
   for (int k = 0; k < 3; k++) {
     weight[k] = fmax(0, orb_det(p, point_of(job, 3 * t + (k + 1) % 3), point_of(job, 3 * t + (k + 2) % 3)));
@@ -197,9 +198,9 @@ done:
   return status;
 }
 
-orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape,
-                               const int32_t *home, orb_wedges *out) {
-  const orb_mesh *mesh = &shape->mesh;
+static orb_status make_wedges(orb_context *ctx, texcoord_job *job, orb_wedges *out) {
+  const orb_supermesh *supermesh = job->supermesh;
+  const orb_mesh *mesh = &job->shape->mesh;
   memset(out, 0, sizeof *out);
   int32_t *twin = ORB_NEW(ctx, int32_t, 3 * (int64_t)mesh->triangle_count);
   float *corners = ORB_NEW0(ctx, float, 6 * (int64_t)supermesh->triangle_count);
@@ -208,17 +209,12 @@ orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh,
     status = orb_mesh_twins(ctx, mesh->triangles, mesh->triangle_count, mesh->vertex_count, twin);
   }
   if (status == ORB_OK) {
-    texcoord_job job = {.ctx = ctx,
-                        .supermesh = supermesh,
-                        .shape = shape,
-                        .places = supermesh->places, /* of the first shape */
-                        .twin = twin,
-                        .home = home,
-                        .corners = corners};
-    orb_parallel_for(ctx, supermesh->triangle_count, GRAIN, corner_body, &job);
+    job->twin = twin;
+    job->corners = corners;
+    orb_parallel_for(ctx, supermesh->triangle_count, GRAIN, corner_body, job);
     status = orb_context_check(ctx);
     if (status == ORB_OK) {
-      status = gather(ctx, &job, out);
+      status = gather(ctx, job, out);
     }
   }
   orb_free(ctx, twin);
@@ -227,4 +223,28 @@ orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh,
     orb_wedges_free(ctx, out);
   }
   return status;
+}
+
+orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape,
+                               const int32_t *home, orb_wedges *out) {
+  texcoord_job job = {.ctx = ctx,
+                      .supermesh = supermesh,
+                      .shape = shape,
+                      .places = supermesh->places, /* of the first shape */
+                      .home = home,
+                      .texcoords = shape->mesh.texcoords,
+                      .material = shape->mesh.material};
+  return make_wedges(ctx, &job, out);
+}
+
+orb_status orb_wedge_charts(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape, int32_t s,
+                            const int32_t *home, const float *texcoords, orb_wedges *out) {
+  texcoord_job job = {.ctx = ctx,
+                      .supermesh = supermesh,
+                      .shape = shape,
+                      .places = supermesh->places + (int64_t)s * supermesh->vertex_count,
+                      .home = home,
+                      .texcoords = texcoords,
+                      .material = s == 0 ? shape->mesh.material : NULL};
+  return make_wedges(ctx, &job, out);
 }

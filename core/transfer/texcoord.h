@@ -14,4 +14,10 @@ ORB_MUST_CHECK orb_status orb_home_triangles(orb_context *ctx, const orb_superme
 ORB_MUST_CHECK orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh,
                                               const orb_aligned_shape *shape, const int32_t *home, orb_wedges *out);
 
+/* Likewise for a set of texture coordinates of shape s, 2 a corner of its mesh. Only materials of the first
+ * shape make seams, as the asset has its primitives. */
+ORB_MUST_CHECK orb_status orb_wedge_charts(orb_context *ctx, const orb_supermesh *supermesh,
+                                           const orb_aligned_shape *shape, int32_t s, const int32_t *home,
+                                           const float *texcoords, orb_wedges *out);
+
 #endif

@@ -373,11 +373,14 @@ orb_status orb_wedge_normals(orb_context *ctx, const orb_supermesh *supermesh, c
 
 orb_status orb_wedge_colors(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape, int32_t s,
                             orb_wedges *out) {
+  memset(out, 0, sizeof *out);
+  return shape->mesh.colors ? orb_wedge_colored(ctx, supermesh, shape, s, shape->mesh.colors, out) : ORB_OK;
+}
+
+orb_status orb_wedge_colored(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape,
+                             int32_t s, const float *colors, orb_wedges *out) {
   wedge_job job = job_of(supermesh, shape, s, out);
-  if (!shape->mesh.colors) {
-    return ORB_OK;
-  }
-  job.corner_values = shape->mesh.colors;
+  job.corner_values = colors;
   job.width = 4;
   job.tolerance = COLOR_SEAM;
   return make_wedges(ctx, &job);

@@ -26,6 +26,10 @@ ORB_MUST_CHECK orb_status orb_wedge_normals(orb_context *ctx, const orb_supermes
                                             const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
 ORB_MUST_CHECK orb_status orb_wedge_colors(orb_context *ctx, const orb_supermesh *supermesh,
                                            const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
+/* Likewise for colours that the mesh does not hold: 4 a corner of it. */
+ORB_MUST_CHECK orb_status orb_wedge_colored(orb_context *ctx, const orb_supermesh *supermesh,
+                                            const orb_aligned_shape *shape, int32_t s, const float *colors,
+                                            orb_wedges *out);
 /* For setting the corners one after another: the values of each vertex as linked lists. */
 typedef struct orb_wedge_chain {
   int32_t capacity;

@@ -26,7 +26,7 @@ _orbmorph() {
   fi
   case "${COMP_WORDS[1]}" in
     morph)
-      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --handle-size --take-part --profile "
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --transfer --set --no-wait --repair --handle-size --take-part --profile "
       ;;
     upload)
       words="--server --json --quiet --help --name --repair --handle-size --take-part --format "
@@ -35,7 +35,7 @@ _orbmorph() {
       words="--server --json --quiet --help --output --set --no-wait --repair --handle-size --take-part --method --preset "
       ;;
     merge)
-      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --handle-size --take-part --profile "
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --transfer --set --no-wait --repair --handle-size --take-part --profile "
       ;;
     job)
       words="--server --json --quiet --help --wait --cancel "

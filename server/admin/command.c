@@ -159,7 +159,8 @@ int admin_command_run(const admin_command *command, const config *options) {
   char line[ADMIN_LINE], shown[ADMIN_WORD];
   catalogue *cat = NULL;
   api_text reply = {0};
-  store_result opened = catalogue_open_at(options->data, config_catalogue(options), &cat);
+  store_result opened =
+      catalogue_open_among(options->data, config_catalogue(options), strcmp(options->objects, "files") != 0, &cat);
   if (opened != STORE_OK) {
     return opened == STORE_UNFIT ? CONFIG_UNFIT : 1;
   }

@@ -140,6 +140,9 @@ static int in_flight(const deliverer *d, const char *receiver) {
 
 /* Starts what is due. Returns when to look again at the latest, in ms from now. */
 static int send_due(deliverer *d, delivery_row *rows) {
+  if (d->options.may && !d->options.may(d->options.user)) {
+    return POLL_MS;
+  }
   int64_t now = now_ms();
   int found = catalogue_deliveries_due(d->cat, now, DELIVER_MOST / 2, DELIVER_MOST, rows),
       room = DELIVER_MOST - d->count;

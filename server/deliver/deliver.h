@@ -22,6 +22,8 @@ typedef struct deliver_options {
   networks allowed;        /* besides public addresses */
   const char *authorities; /* PEM file of certificate authorities; "": those of the system */
   int64_t retry_ms;        /* the first wait after a failure */
+  int (*may)(void *user);  /* whether this node sends; NULL: it does */
+  void *user;
 } deliver_options;
 
 typedef struct deliverer deliverer;

@@ -25,7 +25,7 @@ static int64_t limit_of(const request *r) {
 static void refuse_size(request *r) {
   api_problem problem = {0};
   long long most = (long long)limit_of(r);
-  api_refuse(&problem, "too-large", "The%s body has more than %lld bytes, the limit of this route.",
+  api_refuse(&problem, "too-large", "The%s body has more than %lld bytes, the limit of this route. Send a smaller one.",
              r->decoder ? " decompressed" : "", most);
   api_json_member_integer(&problem.facts, "limit", most);
   reply_problem(r, &problem);
@@ -101,7 +101,8 @@ static int take_plain(void *user, const char *bytes, size_t size) {
 
 static void refuse_coding(request *r, const char *why) {
   api_problem problem = {0};
-  api_refuse(&problem, "malformed-encoding", "The body cannot be decompressed: %s.", why);
+  api_refuse(&problem, "malformed-encoding",
+             "The body cannot be decompressed: %s. Compress it again, or send it as it is.", why);
   api_json_member_integer(&problem.facts, "offset", r->wire);
   reply_problem(r, &problem);
 }
@@ -193,7 +194,8 @@ cJSON *read_json(request *r, api_problem *problem) {
   if (!body && !error.why) {
     api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   } else if (!body) {
-    api_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu).", error.why, error.offset);
+    api_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu). Correct it there.", error.why,
+               error.offset);
     api_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
   }
   return body;

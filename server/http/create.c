@@ -23,7 +23,9 @@ static int summary_of(request *r, const char *mesh, api_mesh_summary *out, api_p
   }
   int fine = entry && api_mesh_summarise(entry->row.json, out);
   cache_release(srv->descriptions, entry);
-  return fine || api_refuse(problem, "internal", "The description of the mesh %s cannot be read.", mesh);
+  return fine ||
+         api_refuse(problem, "internal",
+                    "The stored description of the mesh %s cannot be read: DELETE the mesh and upload it again.", mesh);
 }
 
 static int no_memory(api_problem *problem) {

@@ -121,44 +121,8 @@ static int is_event(const request *r, int64_t number) {
   return same;
 }
 
-/* A job that is not in memory has ended: sends its stored events in one response. */
-static void ended_away(request *r) {
-  job_row row;
-  store_result result = catalogue_job_get(r->srv->cat, r->id, &row);
-  if (result != STORE_OK) {
-    reply_store(r, result);
-    return;
-  }
-  int seen = access_sees(r, row.owner);
-  job_row_free(&row);
-  if (!seen) {
-    reply_store(r, STORE_NOT_FOUND);
-    return;
-  }
-  api_text text = {0};
-  int64_t after = last_seen(r);
-  int fine = write_stored(r, after, &text);
-  if (fine && text.size == 0 && after > 0 && !is_event(r, after)) {
-    fine = write_stored(r, 0, &text);
-  }
-  if (!fine) {
-    api_text_free(&text);
-    reply_store(r, STORE_ERROR);
-    return;
-  }
-  if (text.size == 0 && !text.failed) {
-    reply_over(r);
-    return;
-  }
-  reply_text(r, 200, "text/event-stream", &text);
-  reply_header(r, "Cache-Control", "no-store");
-}
-
-enum MHD_Result handle_job_events(request *r) {
-  job *j = queue_find(r->srv->q, r->id);
-  if (!j) {
-    return request_go_away(r, r->srv->io, ended_away);
-  }
+/* Streams the events of a job in memory. Takes over the reference. */
+static enum MHD_Result stream_job(request *r, job *j) {
   if (!access_sees(r, job_owner(j))) {
     queue_release(r->srv->q, j);
     reply_store(r, STORE_NOT_FOUND);
@@ -192,4 +156,47 @@ enum MHD_Result handle_job_events(request *r) {
   r->phase = PHASE_SEND;
   add_headers(r);
   return MHD_YES;
+}
+
+/* A job that is not in memory runs on another node, or has ended: sends its stored events in one response. */
+static void events_away(request *r) {
+  job_row row;
+  job *live = queue_follow(r->srv->q, r->id);
+  if (live) {
+    stream_job(r, live);
+    return;
+  }
+  store_result result = catalogue_job_get(r->srv->cat, r->id, &row);
+  if (result != STORE_OK) {
+    reply_store(r, result);
+    return;
+  }
+  int seen = access_sees(r, row.owner);
+  job_row_free(&row);
+  if (!seen) {
+    reply_store(r, STORE_NOT_FOUND);
+    return;
+  }
+  api_text text = {0};
+  int64_t after = last_seen(r);
+  int fine = write_stored(r, after, &text);
+  if (fine && text.size == 0 && after > 0 && !is_event(r, after)) {
+    fine = write_stored(r, 0, &text);
+  }
+  if (!fine) {
+    api_text_free(&text);
+    reply_store(r, STORE_ERROR);
+    return;
+  }
+  if (text.size == 0 && !text.failed) {
+    reply_over(r);
+    return;
+  }
+  reply_text(r, 200, "text/event-stream", &text);
+  reply_header(r, "Cache-Control", "no-store");
+}
+
+enum MHD_Result handle_job_events(request *r) {
+  job *j = queue_find(r->srv->q, r->id);
+  return j ? stream_job(r, j) : request_go_away(r, r->srv->io, events_away);
 }

@@ -56,8 +56,8 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
   }
   int64_t most = kind == ROUTE_JSON_BODY || is_fetch(r) ? options->max_json : options->max_body;
   if (length > most) {
-    api_refuse(problem, "too-large", "The body has %lld bytes; the limit of this route is %lld.", (long long)length,
-               (long long)most);
+    api_refuse(problem, "too-large", "The body has %lld bytes; the limit of this route is %lld. Send a smaller one.",
+               (long long)length, (long long)most);
     api_json_member_integer(&problem->facts, "limit", most);
     return 0;
   }

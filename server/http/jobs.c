@@ -25,7 +25,9 @@ int64_t read_wait_ms(request *r) {
 }
 
 static void refuse_ended(request *r, api_job_state state) {
-  reply_refuse(r, "job-ended", "The job has already %s and cannot be cancelled.", api_job_state_name(state));
+  reply_refuse(r, "job-ended",
+               "The job has already %s, so there is nothing to cancel. GET it for its result or its problem.",
+               api_job_state_name(state));
 }
 
 /* Responds with the job. A request that cancels it is refused if the job succeeded or failed first. */
@@ -138,7 +140,7 @@ static void write_row(const job_row *row, api_text *out) {
   api_job_view view = {.id = row->id,
                        .result = row->result[0] ? row->result : row->key,
                        .stage = NULL,
-                       .problem = row->problem,
+                       .problem = api_job_ended(row->state) ? row->problem : NULL,
                        .kind = row->kind,
                        .state = row->state,
                        .progress = row->state == API_JOB_SUCCEEDED ? 1 : 0,
@@ -149,7 +151,26 @@ static void write_row(const job_row *row, api_text *out) {
   api_job_write(&view, out);
 }
 
+/* Responds with a job in memory, or waits for it. Takes over the reference. */
+static void get_live(request *r, job *j) {
+  if (!access_sees(r, job_owner(j))) {
+    reply_store(r, STORE_NOT_FOUND);
+  } else if (r->wait_until > 0) {
+    r->waits_for = j;
+    r->phase = PHASE_WAIT;
+    return;
+  } else {
+    reply_job(r, j);
+  }
+  queue_release(r->srv->q, j);
+}
+
 static void get_away(request *r) {
+  job *live = queue_follow(r->srv->q, r->id);
+  if (live) {
+    get_live(r, live);
+    return;
+  }
   job_row row;
   store_result result = catalogue_job_get(r->srv->cat, r->id, &row);
   if (result != STORE_OK) {
@@ -171,28 +192,18 @@ enum MHD_Result handle_job_get(request *r) {
   if (wait < 0) {
     return MHD_YES;
   }
+  r->wait_until = wait ? orb_clock_ms() + wait : 0;
   job *j = queue_find(r->srv->q, r->id);
   if (!j) {
     return request_go_away(r, r->srv->io, get_away);
   }
-  if (wait == 0 || !access_sees(r, job_owner(j))) {
-    if (access_sees(r, job_owner(j))) {
-      reply_job(r, j);
-    } else {
-      reply_store(r, STORE_NOT_FOUND);
-    }
-    queue_release(r->srv->q, j);
-    return MHD_YES;
-  }
-  r->waits_for = j;
-  r->wait_until = orb_clock_ms() + wait;
-  r->phase = PHASE_WAIT;
-  return handle_wait(r);
+  get_live(r, j);
+  return r->phase == PHASE_WAIT ? handle_wait(r) : MHD_YES;
 }
 
 static void cancel_away(request *r) {
   server *srv = r->srv;
-  job *j = queue_find(srv->q, r->id);
+  job *j = queue_follow(srv->q, r->id);
   if (!j) { /* not in memory: it ended long ago, or does not exist */
     job_row row;
     store_result result = catalogue_job_get(srv->cat, r->id, &row);
@@ -242,7 +253,9 @@ enum MHD_Result handle_job_cancel(request *r) {
 }
 
 static api_job_state write_live(request *r, const job_row *row, api_text *out) {
-  job *live = api_job_ended(row->state) ? NULL : queue_find(r->srv->q, row->id);
+  job *live = row->state == API_JOB_QUEUED    ? queue_find(r->srv->q, row->id)
+              : row->state == API_JOB_RUNNING ? queue_follow(r->srv->q, row->id)
+                                              : NULL;
   api_job_state state = row->state;
   if (live) {
     state = queue_job_write(r->srv->q, live, out);

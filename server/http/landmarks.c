@@ -106,7 +106,7 @@ static cJSON *load(request *r, const char *id, api_problem *problem) {
   cache_release(r->srv->descriptions, entry);
   cJSON_Delete(whole);
   if (!list) {
-    api_refuse(problem, "internal", "The landmarks %s cannot be read.", id);
+    api_refuse(problem, "internal", "The stored landmarks %s cannot be read: DELETE them and POST them again.", id);
   }
   return list;
 }

@@ -7,11 +7,7 @@
 #include "http/http.h"
 #include "intake.h"
 
-enum {
-  LARGE_UPLOAD = 256 << 10, /* smaller ones are checked in less than a second, whatever is in them (docs/limits.md) */
-  LOOK_BYTES = 1 << 20,
-  HALF_OPEN_MS = 1000
-};
+enum { LOOK_BYTES = 1 << 20, HALF_OPEN_MS = 1000 };
 
 static void refuse_full(request *r) {
   reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
@@ -108,6 +104,7 @@ static int store_within(request *r, const intake_file *file, int64_t memory, int
   const intake_limits limits = {.memory = memory,
                                 .deadline_ms = orb_clock_ms() + 1000 * srv->options->check_seconds,
                                 .max_triangles = srv->options->max_triangles,
+                                .part = r->away_task.part,
                                 .wanted = is_wanted,
                                 .user = r};
   orb_context *ctx = context_for_check(&limits);
@@ -192,7 +189,7 @@ static void upload_away(request *r) {
 
 enum MHD_Result handle_mesh_file(request *r) {
   const memory_budget *memory = r->srv->memory;
-  const int large = r->received > LARGE_UPLOAD;
+  const int large = r->received > BUDGET_SMALL_FILE;
   r->away_task.part = large ? BUDGET_CHECKS : BUDGET_SMALL;
   r->away_task.memory = large ? budget_for_file(memory, BUDGET_CHECKS, r->received)
                               : budget_for_densest_file(memory, BUDGET_SMALL, r->received);

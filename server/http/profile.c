@@ -69,10 +69,11 @@ static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *p
   if (found != STORE_OK) {
     int gone = found == STORE_NOT_FOUND && !evict_is_named(r->srv->cat, OBJECT_ASSET, r->id);
     return api_refuse(problem, gone ? "not-found" : "internal", "%s",
-                      gone ? "Nothing has this id; it may have been deleted."
+                      gone
+                          ? "Nothing has this id: it may have been deleted, or belongs to another tenant. Check the id."
                       : found == STORE_NOT_FOUND
                           ? "The server has lost this file. DELETE the resource, then request it again."
-                          : "The store could not be read; the server's log says why.");
+                          : "The store could not be read. Try again later; the daemon's log tells the operator why.");
   }
   void *bytes = size > 0 ? mmap(NULL, (size_t)size, PROT_READ, MAP_PRIVATE, fd, 0) : MAP_FAILED;
   close(fd);

@@ -175,17 +175,21 @@ void reply_job_problem(request *r, const char *json) {
 
 void reply_store(request *r, store_result result) {
   if (result == STORE_NOT_FOUND) {
-    reply_refuse(r, "not-found", "Nothing has this id; it may have been deleted.");
+    reply_refuse(r, "not-found",
+                 "Nothing has this id: it may have been deleted, or belongs to another tenant. Check the id.");
   } else if (result == STORE_FULL) {
     reply_refuse(r, "storage-full", "The server's disk is full; nothing was stored. Free some space and try again.");
   } else if (result == STORE_AWAY) {
     reply_refuse(r, "unavailable", "The store of objects (S3) does not answer; nothing is lost. Try again soon.");
+  } else if (catalogue_is_away(r->srv->cat)) {
+    reply_refuse(r, "unavailable", "The catalogue (PostgreSQL) does not answer; nothing is lost. Try again soon.");
   } else if (objects_is_read_only(r->srv->store)) {
     reply_refuse(r, "read-only",
                  "The server's data folder is on a read-only file system; nothing was stored. Stored results are still "
                  "served.");
   } else {
-    reply_refuse(r, "internal", "The store could not be read or written; the server's log says why.");
+    reply_refuse(r, "internal",
+                 "The store could not be read or written. Try again later; the daemon's log tells the operator why.");
   }
 }
 

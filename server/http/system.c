@@ -150,8 +150,13 @@ static enum MHD_Result ready(request *r) {
     reply_refuse(r, "unavailable", "The catalogue is damaged: stop the daemon and restore a backup.");
     return MHD_YES;
   }
+  if (catalogue_is_away(srv->cat)) {
+    reply_refuse(r, "unavailable", "The catalogue (PostgreSQL) does not answer; the server's log says why.");
+    return MHD_YES;
+  }
   if (objects_are_away(srv->store)) {
-    reply_refuse(r, "unavailable", "The store of objects (S3) does not answer; the server's log says why.");
+    reply_refuse(r, "unavailable",
+                 "The store of objects (S3) does not answer. Try again soon; the daemon's log tells the operator why.");
     return MHD_YES;
   }
   api_text json = {0};

@@ -52,7 +52,8 @@ int target_refused(const char *target, const char *number, struct MHD_Connection
     return 0;
   }
   if (parameters > TARGET_PARAMETERS) {
-    api_refuse(&problem, "uri-too-long", "The query has more than %d parameters.", TARGET_PARAMETERS);
+    api_refuse(&problem, "uri-too-long", "The query has more than %d parameters. Send at most that many.",
+               TARGET_PARAMETERS);
   } else {
     api_refuse(&problem, "uri-too-long",
                "The target has %zu bytes and %zu parameters; bytes and %d for each parameter must be at most %d. "

@@ -28,8 +28,8 @@ static channel_result wait_for(int fd, short events, channel_continues continues
   }
 }
 
-/* Sends what the socket takes now; moves the parts on. */
-static channel_result send_some(int fd, struct msghdr *message, int *passed) {
+/* Sends what the socket takes now; moves the parts on. *full: it took nothing. */
+static channel_result send_some(int fd, struct msghdr *message, int *passed, int *full) {
   char control[CMSG_SPACE(sizeof(int))] = {0};
   message->msg_control = NULL;
   message->msg_controllen = 0;
@@ -43,6 +43,7 @@ static channel_result send_some(int fd, struct msghdr *message, int *passed) {
     memcpy(CMSG_DATA(item), passed, sizeof(int));
   }
   ssize_t sent = sendmsg(fd, message, MSG_NOSIGNAL | MSG_DONTWAIT);
+  *full = sent < 0;
   if (sent < 0) {
     return errno == EINTR || errno == EAGAIN ? CHANNEL_OK : CHANNEL_CLOSED;
   }
@@ -74,9 +75,9 @@ channel_result channel_send(int fd, frame_type type, const struct iovec *parts, 
   }
   struct msghdr message = {.msg_iov = all, .msg_iovlen = (size_t)used};
   channel_result result = begin.size <= CHANNEL_MOST ? CHANNEL_OK : CHANNEL_BAD;
-  while (result == CHANNEL_OK && message.msg_iovlen > 0) {
-    result = wait_for(fd, POLLOUT, continues, user);
-    result = result == CHANNEL_OK ? send_some(fd, &message, &passed) : result;
+  for (int full = 0; result == CHANNEL_OK && message.msg_iovlen > 0;) {
+    result = full ? wait_for(fd, POLLOUT, continues, user) : CHANNEL_OK;
+    result = result == CHANNEL_OK ? send_some(fd, &message, &passed, &full) : result;
   }
   return result;
 }
@@ -101,16 +102,16 @@ static void take_passed(struct msghdr *message, int *passed) {
 
 static channel_result receive_all(int fd, void *to, size_t size, int *passed, channel_continues continues, void *user) {
   for (size_t done = 0; done < size;) {
-    channel_result ready = wait_for(fd, POLLIN, continues, user);
-    if (ready != CHANNEL_OK) {
-      return ready;
-    }
     char control[CMSG_SPACE(4 * sizeof(int))];
     struct iovec part = {(char *)to + done, size - done};
     struct msghdr message = {
         .msg_iov = &part, .msg_iovlen = 1, .msg_control = control, .msg_controllen = sizeof control};
-    ssize_t got = recvmsg(fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+    ssize_t got = recvmsg(fd, &message, (continues ? MSG_DONTWAIT : 0) | MSG_CMSG_CLOEXEC);
     if (got < 0 && (errno == EINTR || errno == EAGAIN)) {
+      channel_result ready = errno == EAGAIN ? wait_for(fd, POLLIN, continues, user) : CHANNEL_OK;
+      if (ready != CHANNEL_OK) {
+        return ready;
+      }
       continue;
     }
     if (got <= 0) {

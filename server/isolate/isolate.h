@@ -3,12 +3,13 @@
  * channel.h   the frames that both sides exchange
  * sandbox.h   what such a process cannot do
  * zygote.c    the small process that forks them
+ * readers.h   processes that check several small files
  *
  * The daemon starts this program again in an internal mode, as the zygote: a process with one thread and without
  * sockets, files or data of callers. For each piece of work the zygote forks a process, which confines itself, gets its
  * inputs as descriptors for reading over the channel, and sends back progress and results. It dies after one piece of
- * work. The daemon alone touches catalogue and store. When the daemon dies, the zygote sees the end of its socket and
- * exits, and the kernel kills the others.
+ * work, or after some small files of one tenant. The daemon alone touches catalogue and store. When the daemon dies,
+ * the zygote sees the end of its socket and exits, and the kernel kills the others.
  */
 #ifndef ORB_ISOLATE_H
 #define ORB_ISOLATE_H

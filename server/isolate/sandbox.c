@@ -17,12 +17,6 @@
 
 #include "log.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define SANITIZED 1 /* sanitizers map terabytes and use system calls of their own */
-#else
-#define SANITIZED 0
-#endif
-
 enum {
   SLACK = 256 << 20,       /* beside the budget: the program, its libraries, results in memory */
   THREAD_BYTES = 10 << 20, /* the stack of a thread, and what malloc() keeps for it */
@@ -67,7 +61,7 @@ static int export(scmp_filter_ctx rules) {
 }
 
 int sandbox_prepare(void) {
-  if (SANITIZED) {
+  if (SANDBOX_SANITIZED) {
     return 0;
   }
   scmp_filter_ctx rules = seccomp_init(SCMP_ACT_ERRNO(EPERM));
@@ -120,7 +114,7 @@ int sandbox_enter(const sandbox_limits *limits) {
   limit(RLIMIT_NOFILE, DESCRIPTORS);
   limit(RLIMIT_CPU, (uint64_t)limits->cpu_seconds);
   limit(RLIMIT_FSIZE, (uint64_t)limits->memory); /* also of memory as a file */
-  if (!SANITIZED) {
+  if (!SANDBOX_SANITIZED) {
     (void)mallopt(M_ARENA_MAX, ARENAS);
     limit(RLIMIT_AS,
           (uint64_t)limits->memory + SLACK + (uint64_t)limits->threads * THREAD_BYTES + (uint64_t)ARENAS * ARENA_BYTES);

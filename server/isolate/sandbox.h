@@ -5,6 +5,18 @@
 
 #include <stdint.h>
 
+/* Sanitizers map terabytes and use system calls of their own. */
+#define SANDBOX_SANITIZED 0
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#undef SANDBOX_SANITIZED
+#define SANDBOX_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#undef SANDBOX_SANITIZED
+#define SANDBOX_SANITIZED 1
+#endif
+#endif
+
 enum { SANDBOX_LANDLOCK = 1, SANDBOX_SECCOMP = 2, SANDBOX_ALL = 3 };
 
 typedef struct sandbox_limits {

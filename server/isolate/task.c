@@ -9,21 +9,25 @@
 #include "isolate/sandbox.h"
 
 void task_confine(const task_head *task) {
-  sandbox_limits limits = {.memory = task->memory + task->inputs,
+  sandbox_limits limits = {.memory = task->limit + task->inputs,
                            .cpu_seconds = task->cpu_seconds,
                            .threads = task->threads,
                            .nice = task->nice};
   sandbox_enter(&limits);
 }
 
-void task_end(int channel, done_head *done, const char *json, const api_problem *problem) {
+channel_result task_answer(int channel, done_head *done, const char *json, const api_problem *problem) {
   const char *text = done->fine ? json : problem && problem->name ? problem->facts.data : NULL;
   if (!done->fine && problem && problem->name) {
     snprintf(done->problem, sizeof done->problem, "%s", problem->name);
     snprintf(done->detail, sizeof done->detail, "%s", problem->detail);
   }
   const struct iovec parts[2] = {{done, sizeof *done}, {(void *)(uintptr_t)text, text ? strlen(text) : 0}};
-  _exit(channel_send(channel, FRAME_DONE, parts, 2, -1, NULL, NULL) == CHANNEL_OK ? 0 : 1);
+  return channel_send(channel, FRAME_DONE, parts, 2, -1, NULL, NULL);
+}
+
+void task_end(int channel, done_head *done, const char *json, const api_problem *problem) {
+  _exit(task_answer(channel, done, json, problem) == CHANNEL_OK ? 0 : 1);
 }
 
 static int is_json(const char *before, const char *text, const char *after) {

@@ -10,13 +10,17 @@
 
 typedef enum task_kind { TASK_CHECK, TASK_EMBEDDING, TASK_SUPERMESH } task_kind;
 
-/* FRAME_TASK; the request of a job follows it. */
+/* FRAME_TASK. For a job, its request follows, then FRAME_INPUT for each input and FRAME_GO. For a check, the descriptor
+ * of the file comes with the frame. */
 typedef struct task_head {
   task_kind kind;
   int threads, nice;
-  int64_t memory, inputs; /* bytes: the budget, and of all inputs together */
-  int64_t deadline_ms;    /* orb_clock_ms() */
-  int64_t cpu_seconds, max_triangles;
+  int again;             /* the process waits for another check after this one; the next three limit all of them */
+  int64_t limit, inputs; /* bytes that the process may take, and of all inputs together */
+  int64_t cpu_seconds;
+  int64_t memory;      /* bytes: the budget of this task */
+  int64_t deadline_ms; /* orb_clock_ms() */
+  int64_t max_triangles;
   char key[API_ID_SIZE]; /* of the job, or the id of the mesh to check */
   double embed_ms;
   char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT]; /* of the mesh to check, as the three below */
@@ -54,7 +58,9 @@ typedef struct done_head {
 
 /* The process's side. Confines the calling process to the limits of the task. */
 void task_confine(const task_head *task);
-/* Sends FRAME_DONE and ends the process. json, problem: may be NULL. */
+/* Sends FRAME_DONE. json, problem: may be NULL. */
+channel_result task_answer(int channel, done_head *done, const char *json, const api_problem *problem);
+/* The same, then ends the process. */
 _Noreturn void task_end(int channel, done_head *done, const char *json, const api_problem *problem);
 
 /* The daemon's side. Reads FRAME_DONE: json is of malloc() or NULL; a result that does not fit together is 0. */

@@ -1,5 +1,6 @@
 #include <errno.h>
 #include <fcntl.h>
+#include <link.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
@@ -7,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -65,6 +67,44 @@ static int hear(int fd, int *number, int passed[PASSED_MOST]) {
 
 /* ---- the zygote ---- */
 
+/* Libraries of which readers and jobs call nothing: HTTP, TLS, databases, and what these need. The forked processes
+ * have them not: they would copy and end several times as many mappings, which took more time than a small job. */
+static const char *const absent[] = {"libmicrohttpd.",  "libgnutls.",  "libsqlite3.", "libpq.",        "libcurl",
+                                     "libseccomp.",     "libp11-kit.", "libidn2.",    "libunistring.", "libtasn1.",
+                                     "libnettle.",      "libhogweed.", "libgmp.",     "libssl.",       "libcrypto.",
+                                     "libgssapi_krb5.", "libldap",     "libnghttp2.", "librtmp.",      "libssh2.",
+                                     "libpsl.",         "liblber",     "libbrotli",   "libffi.",       "libkrb5",
+                                     "libk5crypto.",    "libcom_err.", "libsasl2.",   "libkeyutils.",  "libresolv."};
+
+#if SANDBOX_SANITIZED
+#define FORK fork /* their runtimes follow it */
+enum { LEAVES_OUT = 0 };
+#else
+#define FORK _Fork /* without the handlers of those libraries */
+enum { LEAVES_OUT = 1 };
+#endif
+
+/* All symbols are bound by now: the environment has LD_BIND_NOW. */
+static int leave_out(struct dl_phdr_info *library, size_t size, void *unused) {
+  const char *slash = strrchr(library->dlpi_name, '/'), *name = slash ? slash + 1 : library->dlpi_name;
+  (void)size;
+  (void)unused;
+  for (size_t i = 0; i < sizeof absent / sizeof *absent; i++) {
+    if (strncmp(name, absent[i], strlen(absent[i])) != 0) {
+      continue;
+    }
+    for (int k = 0; k < library->dlpi_phnum; k++) {
+      const ElfW(Phdr) *part = &library->dlpi_phdr[k];
+      if (part->p_type == PT_LOAD) {
+        uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), from = (library->dlpi_addr + part->p_vaddr) & ~(page - 1);
+        uintptr_t to = (library->dlpi_addr + part->p_vaddr + part->p_memsz + page - 1) & ~(page - 1);
+        (void)madvise((void *)from, to - from, MADV_DONTFORK);
+      }
+    }
+  }
+  return 0;
+}
+
 static struct process {
   pid_t pid; /* 0: unused */
   int status;
@@ -119,7 +159,7 @@ static void fork_one(int passed[PASSED_MOST], void (*work)(int channel)) {
     slot++;
   }
   if (slot < PROCESSES) {
-    pid = fork();
+    pid = FORK();
     if (pid == 0) {
       become_process(passed[0], zygote, work);
     }
@@ -140,7 +180,7 @@ static void fork_one(int passed[PASSED_MOST], void (*work)(int channel)) {
 /* What holds here, tried in a process that ends at once. */
 static int try_sandbox(void) {
   int status = 0;
-  pid_t pid = fork();
+  pid_t pid = FORK();
   if (pid == 0) {
     _exit(sandbox_enter(&(sandbox_limits){.memory = 64 << 20, .cpu_seconds = 10, .threads = 1}));
   }
@@ -157,6 +197,9 @@ _Noreturn void isolate_zygote(void (*work)(int channel)) {
   sigprocmask(SIG_SETMASK, &none, NULL);
   prctl(PR_SET_NAME, "orbmorph-fork");
   sandbox_prepare();
+  if (LEAVES_OUT) {
+    dl_iterate_phdr(leave_out, NULL);
+  }
   int holds = try_sandbox();
   if (pipe2(deaths, O_CLOEXEC | O_NONBLOCK) != 0) {
     _exit(1);
@@ -201,12 +244,23 @@ static pid_t spawn(int fd) {
   char *arguments[] = {(char *)(uintptr_t) "orbmorphd", (char *)(uintptr_t)ISOLATE_FLAG, NULL};
   posix_spawn_file_actions_t actions;
   pid_t pid = -1;
+  size_t count = 0;
+  while (environ[count]) {
+    count++;
+  }
+  char **variables = calloc(count + 2, sizeof *variables);
+  if (!variables) {
+    return -1;
+  }
+  memcpy(variables, environ, count * sizeof *variables);
+  variables[count] = (char *)(uintptr_t) "LD_BIND_NOW=1";
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, fd, ISOLATE_FD);
-  int code = posix_spawn(&pid, "/proc/self/exe", &actions, NULL, arguments, environ);
+  int code = posix_spawn(&pid, "/proc/self/exe", &actions, NULL, arguments, variables);
   posix_spawn_file_actions_destroy(&actions);
+  free(variables);
   if (code != 0) {
     log_error("the process that forks isolated processes cannot be started: %s", strerror(code));
     return -1;

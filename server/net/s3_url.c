@@ -2,6 +2,7 @@
 
 #include <ctype.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define LETTERS "abcdefghijklmnopqrstuvwxyz"
@@ -10,7 +11,7 @@
 
 /* What the parameters say. */
 typedef struct parameters {
-  char endpoint[S3_HOST], region[S3_NAME], path_style[4];
+  char endpoint[S3_HOST], region[S3_NAME], path_style[4], part_mib[8];
 } parameters;
 
 static int consists_of(const char *text, const char *set) {
@@ -56,7 +57,8 @@ static int read_parameter(const char *text, size_t n, parameters *out) {
     size_t size;
   } known[] = {{"endpoint", out->endpoint, sizeof out->endpoint},
                {"region", out->region, sizeof out->region},
-               {"path_style", out->path_style, sizeof out->path_style}};
+               {"path_style", out->path_style, sizeof out->path_style},
+               {"part_mib", out->part_mib, sizeof out->part_mib}};
   for (size_t i = 0; equals && i < sizeof known / sizeof known[0]; i++) {
     if (name == strlen(known[i].name) && strncmp(text, known[i].name, name) == 0) {
       return decode(equals + 1, n - name - 1, known[i].value, known[i].size);
@@ -127,7 +129,7 @@ static const char *read_prefix(const char *from, size_t n, s3_place *out) {
 }
 
 static const char *read_all(const char *text, s3_place *out) {
-  parameters p = {.region = "us-east-1", .path_style = "0"};
+  parameters p = {.region = "us-east-1", .path_style = "0", .part_mib = "64"};
   if (strncmp(text, "s3://", 5) != 0) {
     return "it must begin with s3://";
   }
@@ -141,7 +143,7 @@ static const char *read_all(const char *text, s3_place *out) {
   for (const char *at = text + whole; !why && *at;) {
     size_t n = strcspn(++at, "&");
     if (!read_parameter(at, n, &p)) {
-      return "its parameters may only be endpoint, region and path_style, each with a value";
+      return "its parameters may only be endpoint, region, path_style and part_mib, each with a value";
     }
     at += n;
   }
@@ -153,6 +155,10 @@ static const char *read_all(const char *text, s3_place *out) {
   }
   if (strcmp(p.path_style, "0") != 0 && strcmp(p.path_style, "1") != 0) {
     return "its path_style must be 0 or 1";
+  }
+  out->part_mib = consists_of(p.part_mib, DIGITS) ? atoi(p.part_mib) : 0;
+  if (out->part_mib < S3_PART_LEAST || out->part_mib > S3_PART_MOST) {
+    return "its part_mib must be a number from 5 to 5120";
   }
   strcpy(out->region, p.region);
   return place_host(&p, out);

@@ -2,10 +2,14 @@
 #include <string.h>
 
 #include "queue/internal.h"
+#include "queue/shared.h"
 
 queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const char *const *requests,
                             const int64_t *costs, int count) {
   queue_result result = QUEUE_OK;
+  if (q->shared) {
+    return shared_wait_for(q, j, keys, requests, costs, count);
+  }
   pthread_mutex_lock(&q->lock);
   memcpy(j->dependencies, keys, (size_t)count * sizeof *keys);
   j->dependency_count = count;

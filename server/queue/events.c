@@ -6,6 +6,7 @@
 #include "queue/internal.h"
 #include "wake.h"
 
+enum { SHARED_EVENT_MS = 1000 };        /* for those who watch a job from other nodes */
 enum { TIMER_MS = 100, MOVE_MS = 300 }; /* how often waiters, and the progress of silent stages, are looked at */
 #define DEPENDENCIES_SHARE 0.25         /* of the progress of a supermesh whose embeddings are made first */
 
@@ -111,7 +112,8 @@ static void add_event(queue *q, job *j, const char *type, int store) {
   int64_t number = prepare_event(j, &json);
   if (!json.failed) {
     keep_event(j, number, type, json.data);
-    if (store) {
+    if (store || (q->shared && orb_clock_ms() - j->stored_event_ms >= SHARED_EVENT_MS)) {
+      j->stored_event_ms = orb_clock_ms();
       catalogue_event(q->cat, j->row.id, number, type, json.data);
     }
   }
@@ -143,7 +145,10 @@ int64_t queue_events_write(queue *q, job *j, int64_t after, api_text *out, int *
 int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
   pthread_mutex_lock(&q->lock);
   *over = api_job_ended(j->row.state) && seen == j->last_event;
-  int64_t after = seen > j->last_event ? 0 : seen;
+  /* Another node may have sent more events of this attempt than it stored. */
+  int elsewhere = q->shared && !j->taken && !api_job_ended(j->row.state);
+  int64_t known = elsewhere ? (j->row.attempt + 1) * EVENT_STRIDE : j->last_event;
+  int64_t after = seen > j->last_event && seen > known ? 0 : seen;
   pthread_mutex_unlock(&q->lock);
   return after;
 }
@@ -236,7 +241,7 @@ void *timer_main(void *argument) {
       moved = now;
       move_on(q, j, now);
     }
-    pthread_cond_broadcast(&q->work); /* the retry_at of a job may have passed */
+    wake_workers(q); /* the retry_at of a job may have passed */
   }
   pthread_mutex_unlock(&q->lock);
   return NULL;

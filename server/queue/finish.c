@@ -5,6 +5,7 @@
 #include "faults.h"
 #include "log.h"
 #include "queue/internal.h"
+#include "queue/shared.h"
 #include "store/usage.h"
 
 static void release_dependents(queue *q, job *ended) {
@@ -37,7 +38,7 @@ static void publish_end(queue *q, job *j, int64_t number, const char *json) {
   release_dependents(q, j);
   wake_job(q, j, 1);
   table_ended(q, j);
-  pthread_cond_broadcast(&q->work);
+  wake_workers(q);
 }
 
 /* Commits the end of a taken job, then shows it. worked: a worker has taken the job; it leaves the job in the same step
@@ -63,6 +64,17 @@ static store_result end_job(queue *q, job *j, job_end *end, int worked) {
   FAULT_POINT("after-finish");
   if (stored == STORE_OK) {
     pthread_mutex_lock(&q->lock);
+    const int left = !worked && q->shared && j->taken; /* a worker that has lost it shows the end when it leaves it */
+    if (api_job_ended(j->row.state) || left) {         /* a notice was faster */
+      if (left && j->ctx) {
+        orb_context_cancel(j->ctx);
+      } else if (worked) {
+        schedule_leave(q, j);
+      }
+      pthread_mutex_unlock(&q->lock);
+      api_text_free(&json);
+      return STORE_OK;
+    }
     copy_text(j->row.result, sizeof j->row.result, end->mesh ? end->mesh : "");
     ended_locked(q, j, state, end->problem, end->now);
     if (worked) {
@@ -131,6 +143,14 @@ static void cancel_needless(queue *q, job *of) {
 
 static void finish_as(queue *q, job *j, job_end *end) {
   store_result stored = end_job(q, j, end, 1);
+  while (stored == STORE_ERROR && q->shared && shared_pause(q)) { /* the database is away: nothing is lost */
+    stored = end_job(q, j, end, 1);
+  }
+  if (stored == STORE_CONFLICT && q->shared) {
+    log_warn("job %s, attempt %d: this node has lost it; its result is dropped", j->row.id, j->row.attempt);
+    queue_give_back(q, j);
+    return;
+  }
   if (stored != STORE_OK) {
     log_error("the end of job %s could not be stored; the job will run again", j->row.id);
     pthread_mutex_lock(&q->lock);
@@ -139,7 +159,7 @@ static void finish_as(queue *q, job *j, job_end *end) {
     queue_give_back(q, j);
     return;
   }
-  if (end->state == API_JOB_CANCELLED) {
+  if (end->state == API_JOB_CANCELLED && !q->shared) {
     cancel_needless(q, j);
   }
   pthread_mutex_lock(&q->lock);
@@ -171,12 +191,20 @@ static void count_time(queue *q, const job *j) {
   }
 }
 
+static store_result release(queue *q, const job *j) {
+  return q->shared && j->needs_all ? catalogue_job_release_big(q->cat, j->row.id, j->row.attempt)
+                                   : catalogue_job_release(q->cat, j->row.id, j->row.attempt);
+}
+
 void queue_give_back(queue *q, job *j) {
   int claimed = j->running;
   count_time(q, j);
-  store_result stored = claimed ? catalogue_job_release(q->cat, j->row.id, j->row.attempt) : STORE_OK;
+  store_result stored = claimed ? release(q, j) : STORE_OK;
+  while (stored == STORE_ERROR && q->shared && shared_pause(q)) {
+    stored = release(q, j);
+  }
   pthread_mutex_lock(&q->lock);
-  if (claimed) {
+  if (claimed && !api_job_ended(j->row.state)) {
     j->row.state = API_JOB_QUEUED;
     j->row.attempt -= stored == STORE_OK;
     j->stage[0] = 0;
@@ -186,8 +214,13 @@ void queue_give_back(queue *q, job *j) {
   }
   show_queued(j);
   schedule_leave(q, j);
+  char id[API_JOB_ID_SIZE];
+  memcpy(id, j->row.id, sizeof id);
   job_unref(j);
   pthread_mutex_unlock(&q->lock);
+  if (q->shared) {
+    shared_refresh(q, id);
+  }
 }
 
 int queue_needs_memory(queue *q, job *j) {
@@ -207,12 +240,15 @@ int queue_crashed(queue *q, job *j, int is_sure) {
   int crashes = j->row.crashes + is_sure;
   pthread_mutex_unlock(&q->lock);
   store_result stored = catalogue_job_crashed(q->cat, &j->row, is_sure, !is_sure, unix_ms());
+  while (stored == STORE_ERROR && q->shared && shared_pause(q)) {
+    stored = catalogue_job_crashed(q->cat, &j->row, is_sure, !is_sure, unix_ms());
+  }
   if (crashes >= MOST_CRASHES) {
     return 1;
   }
   count_time(q, j);
   pthread_mutex_lock(&q->lock);
-  j->row.state = API_JOB_QUEUED;
+  j->row.state = api_job_ended(j->row.state) ? j->row.state : API_JOB_QUEUED;
   j->row.crashes = crashes;
   j->row.suspect = !is_sure;
   j->stage[0] = 0;
@@ -233,6 +269,11 @@ int queue_runs_alone(queue *q, job *j) {
 }
 
 void queue_put_off(queue *q, job *j) {
+  if (q->shared) { /* it was claimed */
+    shared_hold(q, RETRY_SOON_MS);
+    queue_give_back(q, j);
+    return;
+  }
   pthread_mutex_lock(&q->lock);
   show_queued(j);
   j->retry_at = orb_clock_ms() + RETRY_SOON_MS;
@@ -241,7 +282,35 @@ void queue_put_off(queue *q, job *j) {
   pthread_mutex_unlock(&q->lock);
 }
 
+/* The mark in the catalogue reaches whoever runs the job, or claims it at this moment. A job that nobody runs ends
+ * here; it may be claimed, or put to wait, at the same moment. */
+static store_result cancel_shared(queue *q, job *j) {
+  enum { TRIES = 8 };
+  job_mark mark;
+  store_result stored = catalogue_job_cancel(q->cat, j->row.id);
+  for (int i = 0; i < TRIES && stored == STORE_OK; i++) {
+    int found = catalogue_job_marks(q->cat, j->row.id, 1, &mark);
+    shared_refresh(q, j->row.id);
+    if (found != 1 || !mark.queued) {
+      stored = found < 0 ? STORE_ERROR : STORE_OK;
+      break;
+    }
+    stored = end_job(q, j, &(job_end){.state = API_JOB_CANCELLED}, 0);
+    if (stored == STORE_OK) {
+      return STORE_OK;
+    }
+    stored = stored == STORE_CONFLICT ? STORE_OK : stored;
+  }
+  if (stored == STORE_OK) {
+    shared_cancelled(q, j->row.id);
+  }
+  return stored;
+}
+
 store_result queue_cancel(queue *q, job *j) {
+  if (q->shared) {
+    return cancel_shared(q, j);
+  }
   pthread_mutex_lock(&q->lock);
   int mine = cancel_locked(j);
   pthread_mutex_unlock(&q->lock);

@@ -45,7 +45,7 @@ struct job {
   int needs_all;    /* of the memory that jobs may have */
   int64_t retry_at; /* not chosen before this time, orb_clock_ms() */
   orb_context *ctx;
-  int64_t last_event, last_event_ms;
+  int64_t last_event, last_event_ms, stored_event_ms;
   job_event events[EVENTS_KEPT];
   int event_count;
   waiter *waiters;
@@ -58,17 +58,18 @@ struct job {
 
 struct queue {
   pthread_mutex_t lock;
-  pthread_cond_t work, committed, timer_wake;
+  pthread_cond_t work, fetch_work, committed, timer_wake; /* fetch_work: for the threads that fetch */
   queue_options options;
   catalogue *cat;
   job *by_id[BUCKETS], *by_key[BUCKETS];
   job *first, *last;
   job *oldest_ended, *newest_ended;
-  int ended_count, unfinished;
+  int ended_count, unfinished, unfinished_fetches;
   int running, running_large, fetching, exclusive; /* fetching: of those that run */
   int isolated;                                    /* jobs have processes of their own */
   int guests;                                      /* of those that run */
-  int stopping, waking;
+  int stopping, stopping_now, waking;
+  struct sharing *shared; /* with other nodes; NULL: this process alone runs the jobs */
   struct {
     char name[64];
     int64_t service;       /* milliseconds of workers, for running jobs at least the estimate */
@@ -98,16 +99,38 @@ static inline int fetches(const job *j) {
 static inline int64_t used_ms(const job *j, int64_t now) {
   return now > j->taken_at ? now - j->taken_at : 0;
 }
+/* Something may be there to take. Threads whose jobs there are not sleep on. */
+static inline void wake_workers(queue *q) {
+  if (q->shared || q->unfinished > q->unfinished_fetches || q->stopping) { /* shared: all wait for that */
+    pthread_cond_broadcast(&q->work);
+  }
+  if (q->unfinished_fetches > 0 || q->stopping) {
+    pthread_cond_broadcast(&q->fetch_work);
+  }
+}
 void owner_enter(queue *q, job *j); /* sets j->owner */
 void owner_leave(queue *q, const job *j);
 void owner_charge(queue *q, job *j, int64_t ms); /* replaces what its owner is charged for it */
 void owners_charge(queue *q);                    /* brings the service of all owners up to date; O(unfinished jobs) */
 void schedule_leave(queue *q, job *j);           /* undoes what queue_take() counted */
+void crash_problem(api_text *text);              /* of a job that crashed alone too often */
+job *schedule_choose(queue *q, queue_lane lane); /* the next job for a worker, or NULL */
+/* The number of jobs besides this one that could run now. O(unfinished jobs). */
+int schedule_beside(const queue *q, const job *chosen, int64_t now);
+/* Counts a job that a worker of this lane takes. */
+void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now);
+int schedule_take_memory(queue *q, queue_lane lane, job *j);
+/* The most triangles of a job for which the lane has memory, −1: none; *big: also for one that needs all. */
+int64_t schedule_room(const queue *q, queue_lane lane, int *big);
 void table_add(queue *q, job *j);
-void table_drop_key(queue *q, job *j); /* removes an ended job from the unfinished ones */
+job *table_with_id(const queue *q, const char *id); /* also one that is not committed; NULL: not in memory */
+void table_forget(queue *q, job *j);                /* an unfinished job that nobody here wants */
+void table_drop_key(queue *q, job *j);              /* removes an ended job from the unfinished ones */
 void table_ended(queue *q, job *j);
 job *table_find(queue *q, const char *key, const char *owner); /* an unfinished job, or NULL */
 int table_key_taken(const queue *q, const job *by_other);      /* a worker has another job with the same key */
+/* A job for a request, in the table, not yet committed, with a reference for the caller; NULL: out of memory. */
+job *job_create(queue *q, const queue_request *request);
 void job_unref(job *j);
 void job_view(const job *j, api_job_view *view);
 void wake_job(queue *q, job *j, int ended);

@@ -2,10 +2,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "api/problem.h"
 #include "faults.h"
 #include "log.h"
 #include "queue/internal.h"
+#include "queue/shared.h"
 #include "wake.h"
 
 enum { BATCH = 64 };
@@ -13,7 +13,10 @@ enum { BATCH = 64 };
 static void memory_freed(void *user) {
   queue *q = user;
   pthread_mutex_lock(&q->lock);
-  pthread_cond_broadcast(&q->work);
+  if (q->shared) {
+    shared_look(q);
+  }
+  wake_workers(q);
   pthread_mutex_unlock(&q->lock);
 }
 
@@ -26,13 +29,14 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   q->cat = cat;
   pthread_mutex_init(&q->lock, NULL);
   pthread_cond_init(&q->work, NULL);
+  pthread_cond_init(&q->fetch_work, NULL);
   pthread_cond_init(&q->committed, NULL);
   wake_init(&q->timer_wake);
   if (options->memory) {
     budget_listen(options->memory, memory_freed, q);
   }
   q->timer_started = pthread_create(&q->timer, NULL, timer_main, q) == 0;
-  if (!q->timer_started) {
+  if (!q->timer_started || (options->sharing && !shared_create(q, options->sharing))) {
     queue_destroy(q);
     return NULL;
   }
@@ -48,6 +52,7 @@ void queue_destroy(queue *q) {
   if (!q) {
     return;
   }
+  shared_stop(q);
   if (q->timer_started) {
     pthread_mutex_lock(&q->lock);
     q->timer_stop = 1;
@@ -66,7 +71,7 @@ void queue_destroy(queue *q) {
   free(q);
 }
 
-/* Adds a job of the catalogue to the table. Takes ownership of the row. */
+/* Adds a job of the catalogue to the table, unless it is there. Takes ownership of the row. */
 static store_result load(queue *q, job_row *row) {
   job *j = calloc(1, sizeof *j);
   if (!j) {
@@ -92,26 +97,50 @@ static store_result load(queue *q, job_row *row) {
     }
   }
   pthread_mutex_lock(&q->lock);
-  table_add(q, j);
+  if (table_with_id(q, j->row.id)) {
+    job_unref(j);
+  } else {
+    table_add(q, j);
+  }
   pthread_mutex_unlock(&q->lock);
   return STORE_OK;
 }
 
+job *queue_follow(queue *q, const char *id) {
+  job_row row;
+  job *j = queue_find(q, id);
+  if (j || !q->shared || catalogue_job_get(q->cat, id, &row) != STORE_OK) {
+    return j;
+  }
+  if (api_job_ended(row.state)) {
+    job_row_free(&row);
+    shared_refresh(q, id);
+    return queue_find(q, id);
+  }
+  if (load(q, &row) != STORE_OK) {
+    return NULL;
+  }
+  pthread_mutex_lock(&q->lock);
+  j = table_with_id(q, id);
+  if (j) {
+    j->refs++;
+  }
+  pthread_mutex_unlock(&q->lock);
+  shared_refresh(q, id); /* a notice may have come before the job was in the table */
+  return j;
+}
+
 store_result queue_recover(queue *q, int isolated) {
-  api_problem problem = {0};
   api_text text = {0};
-  api_refuse(
-      &problem, "crashed",
-      "The daemon crashed %d times while this job ran alone; the job is not retried. Please report this as a bug, "
-      "with its meshes.",
-      MOST_CRASHES);
-  api_problem_write(&problem, &text);
+  q->isolated = isolated;
+  if (q->shared) {
+    return shared_start(q);
+  }
+  crash_problem(&text);
   store_result result =
       text.failed ? STORE_ERROR : catalogue_recover(q->cat, isolated ? 0 : MOST_CRASHES, unix_ms(), text.data);
   api_text_free(&text);
-  api_problem_free(&problem);
   FAULT_POINT("recovered");
-  q->isolated = isolated;
   int64_t after = 0;
   int loaded = 0;
   for (int n = BATCH; n == BATCH && result == STORE_OK;) {
@@ -141,12 +170,13 @@ store_result queue_recover(queue *q, int isolated) {
 void queue_stop(queue *q, int now) {
   pthread_mutex_lock(&q->lock);
   q->stopping = 1;
+  q->stopping_now |= now;
   for (job *j = q->first; j && now; j = j->next) {
     if (j->ctx) {
       orb_context_cancel(j->ctx);
     }
   }
-  pthread_cond_broadcast(&q->work);
+  wake_workers(q);
   pthread_mutex_unlock(&q->lock);
 }
 

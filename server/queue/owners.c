@@ -55,18 +55,6 @@ void owner_enter(queue *q, job *j) {
   *mine = *mine > least ? *mine : least;
 }
 
-void queue_count_of(queue *q, const char *owner, int *running, int *queued) {
-  *running = *queued = 0;
-  pthread_mutex_lock(&q->lock);
-  for (int i = 0; i < q->owner_count; i++) {
-    if (strcmp(q->owners[i].name, owner) == 0) {
-      *running = q->owners[i].running + q->owners[i].fetching;
-      *queued = q->owners[i].unfinished - *running;
-    }
-  }
-  pthread_mutex_unlock(&q->lock);
-}
-
 void owner_leave(queue *q, const job *j) {
   q->owners[j->owner].unfinished--;
 }

@@ -1,14 +1,16 @@
 /* The queue: all unfinished jobs in memory, the connections that wait for them, and the choice of the next job to run.
- * In: requests from server/http. Out: jobs for server/worker, events and ended jobs for waiting connections.
+ * Where several nodes share the jobs, the catalogue has them, and makes the choice by the same rules (shared.h). In:
+ * requests from server/http. Out: jobs for server/worker, events and ended jobs for waiting connections.
  *
  * Reading order:
  *   internal.h      the structs
  *   submit.c        a request becomes a job, or joins the unfinished job with the same key
- *   schedule.c      choosing, taking and claiming a job       owners.c   fairness between owners
+ *   take.c, schedule.c   taking, choosing and claiming a job       owners.c   fairness between owners
  *   dependencies.c  a supermesh waits for its embeddings
  *   finish.c        the end of a job, cancelling, retry
  *   events.c        events, progress, waiters, the timer
- *   table.c         lookup by id and key, references, counts
+ *   table.c         lookup by id and key, references         numbers.c  counts
+ *   shared.h        the same among several nodes: sharing.c, claims.c, watched.c
  *   lifecycle.c     start, recovery after a crash, stop
  *
  * The retry of a job. A job that fails is not retried. The queue runs a job again in two cases. After the store fails,
@@ -64,9 +66,21 @@ typedef struct waiter {
   void (*wake)(struct waiter *self);
 } waiter;
 
+/* Several nodes run the jobs of one catalogue in PostgreSQL. */
+typedef struct queue_sharing {
+  const char *url;  /* of the catalogue */
+  const char *data; /* the data folder remembers this node's name */
+  int works;        /* this node runs jobs */
+  int64_t lease_ms; /* after which other nodes take over the jobs of a node that is silent */
+  /* Another node, or this one, changed a row: 'r', its kind and id; tokens or keys: 't'; or anything: '*'. */
+  void (*changed)(void *user, const char *what);
+  void *user;
+} queue_sharing;
+
 typedef struct queue_options {
   int workers, cores, limit;
-  memory_budget *memory; /* of running jobs; NULL: does not count */
+  memory_budget *memory;        /* of running jobs; NULL: does not count */
+  const queue_sharing *sharing; /* NULL: this process alone runs them */
 } queue_options;
 
 queue *queue_create(const queue_options *options, catalogue *cat);
@@ -116,7 +130,12 @@ int64_t queue_bytes_of(int64_t cost);
 queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh);
 
 /* References. */
-job *queue_find(queue *q, const char *id); /* NULL: not in memory */
+job *queue_find(queue *q, const char *id); /* NULL: not in memory, or another node may have changed it */
+/* The same, also for a job of another node, as it is in the catalogue now; blocks. NULL: it has ended, or does not
+ * exist. */
+job *queue_follow(queue *q, const char *id);
+/* Whether this process does what only one node may do. */
+int queue_keeps_house(queue *q);
 void queue_release(queue *q, job *j);
 
 const char *job_id(const job *j);

@@ -1,7 +1,8 @@
-/* Choosing, taking and claiming a job. */
+/* Choosing and claiming a job. */
 
 #include "faults.h"
 #include "queue/internal.h"
+#include "queue/shared.h"
 
 /* Whether job a goes before job b; b is the older one. share: the workers that an owner may have while others wait. */
 static int goes_before(const queue *q, const job *a, const job *b, int share) {
@@ -70,8 +71,7 @@ static int admits(const queue *q, queue_lane lane, const job *j, int kept) {
   return q->owners[j->owner].running == 0 && (computing >= workers || !fits || kept);
 }
 
-/* The next job for a worker, or NULL. */
-static job *choose(queue *q, queue_lane lane) {
+job *schedule_choose(queue *q, queue_lane lane) {
   int64_t now = orb_clock_ms();
   job *best = NULL;
   int kept = q->exclusive, may_pass = q->isolated && lane == QUEUE_GUESTS;
@@ -121,7 +121,7 @@ static void count(queue *q, const job *j, int by) {
 }
 
 /* 0: others took it just now, and wake the queue when they end. */
-static int take_memory(queue *q, queue_lane lane, job *j) {
+int schedule_take_memory(queue *q, queue_lane lane, job *j) {
   int64_t bytes = memory_of(q, lane, j);
   int taken = bytes == 0 || budget_take(q->options.memory, part_of(lane), bytes);
   j->memory = taken ? bytes : 0;
@@ -135,36 +135,41 @@ int64_t queue_memory_of(queue *q, job *j) {
   return bytes;
 }
 
-int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
-  pthread_mutex_lock(&q->lock);
-  job *j = NULL;
-  while (!q->stopping && !((j = choose(q, lane)) && take_memory(q, lane, j))) {
-    pthread_cond_wait(&q->work, &q->lock);
+int64_t schedule_room(const queue *q, queue_lane lane, int *big) {
+  const int64_t left = q->options.memory ? budget_left(q->options.memory, part_of(lane)) : INT64_MAX;
+  job probe = {.needs_all = 1};
+  int64_t room = -1;
+  probe.row.cost = INT32_MAX;
+  *big = memory_of(q, lane, &probe) <= left;
+  probe.needs_all = 0;
+  for (int64_t step = INT64_C(1) << 32; step > 0; step /= 2) {
+    probe.row.cost = room + step;
+    room += memory_of(q, lane, &probe) <= left ? step : 0;
   }
-  if (j && !q->stopping) {
-    int beside = 0;
-    int64_t now = orb_clock_ms();
-    for (job *other = q->first; other; other = other->next) {
-      beside += other != j && !fetches(other) && runnable(q, other, now);
-    }
-    int wanted = q->running - q->fetching + 1 + beside;
-    int share = wanted < q->options.workers ? wanted : q->options.workers;
-    *threads = q->options.cores / share > 0 ? q->options.cores / share : 1;
-    j->taken = 1;
-    j->refs++;
-    j->is_guest = lane == QUEUE_GUESTS;
-    *threads = j->is_guest ? 1 : *threads;
-    j->taken_at = now;
-    j->charged = 0;
-    owner_charge(q, j, fetches(j) ? 0 : 10 + j->row.cost / TRIANGLES_A_MS);
-    count(q, j, 1);
-    q->exclusive |= j->row.suspect;
-    *out = j;
-  } else {
-    j = NULL;
+  if (room < 0) { /* not even for the smallest job: that is a shortage */
+    probe.row.cost = 0;
+    (void)has_memory(q, lane, &probe);
   }
-  pthread_mutex_unlock(&q->lock);
-  return j != NULL;
+  return room;
+}
+
+void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now) {
+  j->taken = 1;
+  j->refs++;
+  j->is_guest = lane == QUEUE_GUESTS;
+  j->taken_at = now;
+  j->charged = 0;
+  owner_charge(q, j, fetches(j) ? 0 : 10 + j->row.cost / TRIANGLES_A_MS);
+  count(q, j, 1);
+  q->exclusive |= j->row.suspect;
+}
+
+int schedule_beside(const queue *q, const job *chosen, int64_t now) {
+  int beside = 0;
+  for (const job *other = q->first; other; other = other->next) {
+    beside += other != chosen && !fetches(other) && runnable(q, other, now);
+  }
+  return beside;
 }
 
 void schedule_leave(queue *q, job *j) {
@@ -181,11 +186,20 @@ void schedule_leave(queue *q, job *j) {
   j->taken = 0;
   j->running = 0;
   j->ctx = NULL;
-  pthread_cond_broadcast(&q->work);
+  if (q->shared) {
+    shared_look(q);
+  }
+  wake_workers(q);
 }
 
 store_result queue_claim(queue *q, job *j) {
   int64_t now = unix_ms();
+  if (q->shared) { /* queue_take() has claimed it */
+    pthread_mutex_lock(&q->lock);
+    j->row.state = API_JOB_RUNNING;
+    pthread_mutex_unlock(&q->lock);
+    return STORE_OK;
+  }
   FAULT_POINT("before-claim");
   store_result result = catalogue_job_claim(q->cat, j->row.id, j->row.attempt + 1, j->row.suspect, now);
   FAULT_POINT("after-claim");

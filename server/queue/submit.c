@@ -4,14 +4,8 @@
 
 #include "faults.h"
 #include "queue/internal.h"
+#include "queue/shared.h"
 #include "store/deliveries.h"
-
-/* A sphere has 52 bytes a vertex, 13 a triangle, and a head. Results of merges are of this order. */
-enum { BYTES_OF_TRIANGLE = 39, BYTES_OF_HEAD = 512 };
-
-int64_t queue_bytes_of(int64_t cost) {
-  return BYTES_OF_HEAD + BYTES_OF_TRIANGLE * cost;
-}
 
 /* Whether a result of this owner has room beside those of its unfinished jobs. */
 static int has_room(const queue *q, const queue_request *request) {
@@ -64,25 +58,10 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
   if (!has_room(q, request)) {
     return QUEUE_ROOM;
   }
-  j = calloc(1, sizeof *j);
-  char *text = strdup(request->request);
-  if (!j || !text) {
-    free(j);
-    free(text);
+  j = job_create(q, request);
+  if (!j) {
     return QUEUE_ERROR;
   }
-  j->refs = 2; /* one of the table, one of the caller */
-  j->row.request = text;
-  j->row.kind = request->kind;
-  j->row.cost = request->cost;
-  j->row.priority = request->priority;
-  j->row.listed = request->listed;
-  j->row.created = unix_ms();
-  api_random_id(j->row.id);
-  copy_text(j->row.key, sizeof j->row.key, request->key);
-  copy_text(j->row.owner, sizeof j->row.owner, request->owner);
-  copy_text(j->row.charged, sizeof j->row.charged, request->charged ? request->charged : "");
-  table_add(q, j);
   *out = j;
   *fresh = 1;
   return QUEUE_OK;
@@ -90,6 +69,9 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
 
 queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh) {
   int is_fresh = 0, make_listed = 0;
+  if (q->shared) {
+    return shared_submit(q, request, out, fresh);
+  }
   pthread_mutex_lock(&q->lock);
   queue_result result = submit_locked(q, request, out, &is_fresh);
   if (result == QUEUE_OK && !is_fresh && request->listed && !(*out)->row.listed) {
@@ -125,7 +107,7 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
   pthread_mutex_lock(&q->lock);
   if (stored == STORE_OK) {
     j->committed = 1;
-    pthread_cond_broadcast(&q->work); /* only some of those that wait may take it */
+    wake_workers(q); /* only some of those that wait may take it */
   } else {
     j->dead = 1;
     j->row.state = API_JOB_FAILED;

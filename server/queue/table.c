@@ -6,11 +6,19 @@
 #include "hash.h"
 #include "log.h"
 #include "queue/internal.h"
+#include "store/shared.h"
 
 int64_t unix_ms(void) {
   struct timespec now;
   clock_gettime(CLOCK_REALTIME, &now);
   return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* A sphere has 52 bytes a vertex, 13 a triangle, and a head. Results of merges are of this order. */
+enum { BYTES_OF_TRIANGLE = 39, BYTES_OF_HEAD = 512 };
+
+int64_t queue_bytes_of(int64_t cost) {
+  return BYTES_OF_HEAD + BYTES_OF_TRIANGLE * cost;
 }
 
 static unsigned bucket(const char *hex) {
@@ -28,6 +36,7 @@ void table_add(queue *q, job *j) {
   *(q->last ? &q->last->next : &q->first) = j;
   q->last = j;
   q->unfinished++;
+  q->unfinished_fetches += fetches(j);
   owner_enter(q, j);
 }
 
@@ -41,7 +50,39 @@ void table_drop_key(queue *q, job *j) {
   *(j->previous ? &j->previous->next : &q->first) = j->next;
   *(j->next ? &j->next->previous : &q->last) = j->previous;
   q->unfinished--;
+  q->unfinished_fetches -= fetches(j);
   owner_leave(q, j);
+}
+
+job *table_with_id(const queue *q, const char *id) {
+  job *j = q->by_id[bucket(id)];
+  while (j && strcmp(j->row.id, id) != 0) {
+    j = j->next_id;
+  }
+  return j;
+}
+
+job *job_create(queue *q, const queue_request *request) {
+  job *j = calloc(1, sizeof *j);
+  char *text = strdup(request->request);
+  if (!j || !text) {
+    free(j);
+    free(text);
+    return NULL;
+  }
+  j->refs = 2; /* one of the table, one of the caller */
+  j->row.request = text;
+  j->row.kind = request->kind;
+  j->row.cost = request->cost;
+  j->row.priority = request->priority;
+  j->row.listed = request->listed;
+  j->row.created = unix_ms();
+  api_random_id(j->row.id);
+  copy_text(j->row.key, sizeof j->row.key, request->key);
+  copy_text(j->row.owner, sizeof j->row.owner, request->owner);
+  copy_text(j->row.charged, sizeof j->row.charged, request->charged ? request->charged : "");
+  table_add(q, j);
+  return j;
 }
 
 static void drop_id(queue *q, job *j) {
@@ -51,6 +92,12 @@ static void drop_id(queue *q, job *j) {
       return;
     }
   }
+}
+
+void table_forget(queue *q, job *j) {
+  table_drop_key(q, j);
+  drop_id(q, j);
+  job_unref(j);
 }
 
 /* The table's reference moves to the list of ended jobs. */
@@ -87,6 +134,9 @@ job *queue_find(queue *q, const char *id) {
   job *j = q->by_id[bucket(id)];
   while (j && (strcmp(j->row.id, id) != 0 || !j->committed)) {
     j = j->next_id;
+  }
+  if (j && q->shared && !j->taken && !api_job_ended(j->row.state)) {
+    j = NULL;
   }
   if (j) {
     j->refs++;
@@ -167,44 +217,15 @@ api_job_state queue_job_write(queue *q, job *j, api_text *out) {
 
 int queue_needs_mesh(queue *q, const char *mesh, const char *owner) {
   int needed = 0;
+  if (q->shared) {
+    return catalogue_needs_mesh(q->cat, mesh, owner);
+  }
   pthread_mutex_lock(&q->lock);
   for (job *j = q->first; j && !needed; j = j->next) {
     needed = (!owner || strcmp(j->row.owner, owner) == 0) && strstr(j->row.request, mesh) != NULL;
   }
   pthread_mutex_unlock(&q->lock);
   return needed;
-}
-
-static void count_stage(queue_numbers *out, const char *stage) {
-  enum { MOST = sizeof out->stages / sizeof out->stages[0] };
-  int i = 0;
-  while (i < MOST - 1 && out->stages[i].jobs > 0 && strcmp(out->stages[i].name, stage) != 0) {
-    i++;
-  }
-  copy_text(out->stages[i].name, sizeof out->stages[i].name, stage);
-  out->stages[i].jobs++;
-}
-
-void queue_count(queue *q, queue_numbers *out) {
-  memset(out, 0, sizeof *out);
-  pthread_mutex_lock(&q->lock);
-  int64_t now = unix_ms();
-  for (job *j = q->first; j; j = j->next) {
-    int runs = j->running || (j->taken && j->row.kind == API_JOB_FETCH); /* a download comes before the claim */
-    int queued = !runs && j->waits_for == 0;
-    out->queued += queued;
-    if (runs) {
-      count_stage(out, j->stage[0] ? j->stage : "start");
-    }
-    out->waiting += j->waits_for > 0;
-    if (queued && now - j->row.created > out->oldest_ms) {
-      out->oldest_ms = now - j->row.created;
-    }
-  }
-  out->running = q->running;
-  out->waiters = q->waiter_count;
-  memcpy(out->ended, q->ended, sizeof out->ended);
-  pthread_mutex_unlock(&q->lock);
 }
 
 int64_t queue_ended(queue *q, api_job_state state) {
@@ -216,6 +237,9 @@ int64_t queue_ended(queue *q, api_job_state state) {
 
 char *queue_failure(queue *q, const char *key, const char *owner, int64_t since) {
   const job *newest = NULL;
+  if (q->shared) {
+    return catalogue_failure(q->cat, key, owner, since);
+  }
   pthread_mutex_lock(&q->lock);
   for (const job *j = q->oldest_ended; j; j = j->newer_ended) {
     if (is_for(j, key, owner) && j->row.finished > since) {

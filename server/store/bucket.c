@@ -161,7 +161,7 @@ static store_result read_options(const bucket_options *options, object_bucket *b
   snprintf(b->keys, sizeof b->keys, "%s", options->keys);
   snprintf(b->authorities, sizeof b->authorities, "%s", options->authorities);
   b->options.authorities = b->authorities;
-  b->part = options->part ? options->part : BUCKET_PART;
+  b->part = (uint64_t)b->options.place.part_mib << 20;
   return STORE_OK;
 }
 
@@ -276,26 +276,52 @@ static store_result put_part(object_bucket *b, const char *name, const char *upl
   return result;
 }
 
-static store_result complete(object_bucket *b, const char *name, const char *query, const char *list) {
-  char sha[65];
-  unsigned char digest[crypto_hash_sha256_BYTES];
+/* Whether S3 has the object with this hash. */
+static int has(object_bucket *b, const char *name, const char *sha) {
   s3_answer answer;
+  const s3_request request = {.method = "HEAD", .key = name, .to = -1, .tries = 1};
+  s3_send(b->store, &request, &answer);
+  int there = meaning(&answer) == STORE_OK && strcmp(answer.meta, sha) == 0;
+  free(answer.text);
+  return there;
+}
+
+/* S3 puts the parts together. If its answer is lost, it may have done so, and then does not know the upload any more.
+ */
+static store_result complete(object_bucket *b, const char *name, const char *query, const char *list, const char *sha) {
+  char hash[65], why[S3_WHY] = "";
+  unsigned char digest[crypto_hash_sha256_BYTES];
+  store_result result = STORE_AWAY;
   crypto_hash_sha256(digest, (const unsigned char *)list, strlen(list));
-  sodium_bin2hex(sha, sizeof sha, digest, sizeof digest);
+  sodium_bin2hex(hash, sizeof hash, digest, sizeof digest);
   const s3_request request = {.method = "POST",
                               .key = name,
                               .query = query,
                               .body = list,
                               .size = strlen(list),
-                              .sha = sha,
+                              .sha = hash,
                               .to = -1,
-                              .tries = 1}; /* a second time, S3 would not know the upload any more */
-  store_result result = ask(b, &request, &answer);
-  if (result == STORE_OK && answer.text && strstr(answer.text, "<Error>")) { /* S3 sends 200 before it is done */
-    log_warn("S3 could not put the parts of %s together: %.300s", name, answer.text);
-    result = STORE_AWAY;
+                              .tries = 1};
+  for (int tried = 0; tried < TRIES && result == STORE_AWAY; tried++) {
+    s3_answer answer;
+    s3_send(b->store, &request, &answer);
+    result = meaning(&answer);
+    if (result == STORE_OK && answer.text && strstr(answer.text, "<Error>")) { /* S3 sends 200 before it is done */
+      log_warn("S3 could not put the parts of %s together: %.300s", name, answer.text);
+      result = STORE_AWAY;
+    }
+    snprintf(why, sizeof why, "%s", answer.why);
+    free(answer.text);
+    if ((result == STORE_AWAY || result == STORE_NOT_FOUND) && has(b, name, sha)) {
+      result = STORE_OK;
+    } else if (result == STORE_AWAY) {
+      s3_pause(tried);
+    }
   }
-  free(answer.text);
+  if (result == STORE_AWAY || result == STORE_UNFIT || result == STORE_NOT_FOUND) {
+    set_away(b, 1, why);
+    return STORE_AWAY;
+  }
   return result;
 }
 
@@ -324,7 +350,7 @@ static store_result put_parts(object_bucket *b, const char *name, int fd, uint64
   api_text_add(&list, "</CompleteMultipartUpload>");
   snprintf(query, sizeof query, "uploadId=%s", encoded);
   result = result == STORE_OK && list.failed ? STORE_ERROR : result;
-  result = result == STORE_OK ? complete(b, name, query, list.data) : result;
+  result = result == STORE_OK ? complete(b, name, query, list.data, sha) : result;
   api_text_free(&list);
   if (result != STORE_OK) { /* what cannot be aborted now, a lifecycle rule of the bucket removes */
     const s3_request abort = {.method = "DELETE", .key = name, .query = query, .to = -1, .tries = 1};
@@ -359,6 +385,14 @@ store_result bucket_get(object_bucket *b, const char *name, int fd, uint64_t *si
     free(answer.text);
     if (result != STORE_OK) {
       break;
+    }
+    if (!answer.meta[0]) { /* nothing says that it is damaged: it stays */
+      log_error(
+          "S3 answers with %s, but without its hash (x-amz-meta-sha256): something else answers in its place, or it "
+          "was "
+          "copied without its metadata; copy it again with them",
+          name);
+      return STORE_ERROR;
     }
     *size = answer.size;
     if (ftruncate(fd, (off_t)answer.size) != 0 || !bucket_hash(fd, 0, answer.size, sha)) {

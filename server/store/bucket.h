@@ -9,7 +9,7 @@
 #include "store/result.h"
 #include "store/s3.h"
 
-enum { BUCKET_PART = 64 << 20, BUCKET_OWNER = 64, BUCKET_LINK = 8192 };
+enum { BUCKET_OWNER = 64, BUCKET_LINK = 8192 };
 
 typedef struct object_bucket object_bucket;
 
@@ -17,7 +17,6 @@ typedef struct bucket_options {
   const char *url;         /* see net/s3_url.h */
   const char *keys;        /* a file of keys, as the programs of AWS have it; "": the environment */
   const char *authorities; /* PEM file; "": those of the system */
-  uint64_t part;           /* objects that are larger are sent in parts of this size; 0: BUCKET_PART */
 } bucket_options;
 
 /* Reads who owns the bucket's prefix; "": nobody so far. Writes nothing. STORE_UNFIT: no bucket, or its keys are wrong;
@@ -29,7 +28,8 @@ store_result bucket_claim(object_bucket *b, const char *owner);
 
 /* Uploads a whole file. */
 store_result bucket_put(object_bucket *b, const char *name, int fd);
-/* Writes an object to an empty file. STORE_CONFLICT: its bytes do not match their hash, also after some tries. */
+/* Writes an object to an empty file. STORE_CONFLICT: its bytes do not match their hash, also after some tries;
+ * STORE_ERROR: S3 did not send a hash, logged. */
 store_result bucket_get(object_bucket *b, const char *name, int fd, uint64_t *size);
 /* sha: of the object as it was uploaded; modified: when, a Unix time. Either may be NULL. */
 store_result bucket_look(object_bucket *b, const char *name, char sha[65], int64_t *modified);

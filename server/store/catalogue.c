@@ -9,7 +9,10 @@
 #include "faults.h"
 #include "log.h"
 #include "store/catalogue.h"
+#include "store/move_mark.h"
 #include "store/transactions.h"
+
+enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node, or met it */
 
 /* A waiting write. That of catalogue_write() lies on its caller's stack. */
 typedef struct pending {
@@ -25,6 +28,7 @@ struct catalogue {
   pthread_cond_t wake, committed, reader_free;
   pending *first, **last;
   int stopping, started;
+  int shared; /* other nodes use it, too */
   pthread_t thread;
   database writer;
   database readers[DATABASE_READERS];
@@ -47,13 +51,20 @@ static store_result result_of(int code) {
   }
 }
 
+/* Nodes write one after another: the same that one writer thread ensures within a process. */
+static int begin(const catalogue *cat, database *db) {
+  char sql[96];
+  snprintf(sql, sizeof sql, "BEGIN; SELECT pg_advisory_xact_lock(%d, hashtext(current_schema()))", SQL_LOCK_WRITES);
+  return database_execute(db, cat->shared ? sql : database_either(db, "BEGIN IMMEDIATE", "BEGIN"));
+}
+
 /* Runs a batch in one transaction. A write that fails is rolled back alone; if the commit fails, all writes fail. */
-static void run_batch(catalogue *cat, pending *batch) {
+static int run_batch(catalogue *cat, pending *batch) {
   database *db = &cat->writer;
   FAULT_POINT("before-begin");
   /* A previous transaction may still be open if its rollback failed. */
   int code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : SQL_OK;
-  code = code == SQL_OK ? database_execute(db, database_either(db, "BEGIN IMMEDIATE", "BEGIN")) : code;
+  code = code == SQL_OK ? begin(cat, db) : code;
   for (pending *p = batch; p && code == SQL_OK; p = p->next) {
     if (database_execute(db, "SAVEPOINT one") != SQL_OK) {
       code = SQL_IOERR;
@@ -83,6 +94,7 @@ static void run_batch(catalogue *cat, pending *batch) {
       p->code = code;
     }
   }
+  return code;
 }
 
 static void *writer_main(void *argument) {
@@ -99,7 +111,10 @@ static void *writer_main(void *argument) {
     cat->first = NULL;
     cat->last = &cat->first;
     pthread_mutex_unlock(&cat->lock);
-    run_batch(cat, batch);
+    int code = run_batch(cat, batch);
+    for (int tries = 1; cat->shared && code == SQL_BUSY && tries < BUSY_TRIES; tries++) {
+      code = run_batch(cat, batch);
+    }
     pthread_mutex_lock(&cat->lock);
     for (pending *p = batch, *next; p; p = next) {
       next = p->next;
@@ -166,8 +181,21 @@ void catalogue_reader_done(catalogue *cat, database *db) {
   pthread_mutex_unlock(&cat->lock);
 }
 
+/* Whether the catalogue is whole, and not the half of one. */
+static int check_whole(database *db) {
+  char mark[MOVE_MARK];
+  int code = move_mark_read(db, mark);
+  if (code == SQL_OK && *mark) {
+    log_error(
+        "orbmorphd migrate has filled this catalogue in part: run it again until it ends, or name another catalogue");
+    return SQL_UNFINISHED;
+  }
+  return code;
+}
+
 static int open_all(catalogue *cat, const char *path) {
-  int code = database_open(path, 1, &cat->writer);
+  int code = database_open(path, cat->shared ? SQL_SHARES : SQL_WRITES, &cat->writer);
+  code = code == SQL_OK ? check_whole(&cat->writer) : code;
   if (code == SQL_OK) {
     code = database_migrate(&cat->writer);
   }
@@ -181,12 +209,29 @@ const char *catalogue_path(const catalogue *cat) {
   return cat->path;
 }
 
+int catalogue_is_away(const catalogue *cat) {
+  return database_is_url(cat->path) && sql_postgresql_is_away();
+}
+
+int catalogue_was_away(const catalogue *cat, int64_t since) {
+  return database_is_url(cat->path) && sql_postgresql_failed_at() >= since;
+}
+
+int catalogue_is_shared(const catalogue *cat) {
+  return cat->shared;
+}
+
 store_result catalogue_open(const char *where, catalogue **out) {
+  return catalogue_open_shared(where, 0, out);
+}
+
+store_result catalogue_open_shared(const char *where, int shared, catalogue **out) {
   catalogue *cat = calloc(1, sizeof *cat);
   if (!cat) {
     return STORE_ERROR;
   }
   cat->last = &cat->first;
+  cat->shared = shared;
   pthread_mutex_init(&cat->lock, NULL);
   pthread_cond_init(&cat->wake, NULL);
   pthread_cond_init(&cat->committed, NULL);
@@ -202,9 +247,10 @@ store_result catalogue_open(const char *where, catalogue **out) {
     log_error("the catalogue %s cannot be opened: %s", cat->path, sql_reason(code));
   }
   catalogue_close(cat);
-  return code == SQL_FULL                                                                               ? STORE_FULL
-         : database_is_url(where) && (code == SQL_SCHEMA || code == SQL_READONLY || code == SQL_NOTADB) ? STORE_UNFIT
-                                                                                                        : STORE_ERROR;
+  int refused = code == SQL_READONLY || code == SQL_NOTADB;
+  return code == SQL_FULL                                                                      ? STORE_FULL
+         : code == SQL_UNFINISHED || code == SQL_SCHEMA || (database_is_url(where) && refused) ? STORE_UNFIT
+                                                                                               : STORE_ERROR;
 }
 
 void catalogue_close(catalogue *cat) {

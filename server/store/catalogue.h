@@ -13,7 +13,10 @@
  * filter deliveries.c  the outbox: what is still to be sent to webhooks objects.c     publishing, reading and deleting
  * files; spheres.c   the file of aligned spheres; alignments.c   kept alignments
  *   usage.c       what tenants use
+ *   shared.c      jobs of several nodes; notices.c   what nodes hear of each other
+ *   object_lock.c the lock of objects over all nodes
  *   snapshot.c    a copy of the catalogue for a backup; transfer.c   objects from one folder to another
+ *   move.c        a whole deployment from one place to another
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
  * with two). Writes are passed to it as functions. It runs all waiting writes in one transaction (group commit), each
@@ -32,6 +35,13 @@ typedef struct catalogue catalogue;
 
 /* where: the data folder, or the URL of a database in PostgreSQL. */
 store_result catalogue_open(const char *where, catalogue **out);
+/* shared: further nodes use this database in PostgreSQL at the same time (shared.h). */
+store_result catalogue_open_shared(const char *where, int shared, catalogue **out);
+int catalogue_is_shared(const catalogue *cat);
+/* Whether it is in PostgreSQL and that does not answer. */
+int catalogue_is_away(const catalogue *cat);
+/* Whether it did not answer at some moment since orb_clock_ms() was `since`. */
+int catalogue_was_away(const catalogue *cat, int64_t since);
 void catalogue_close(catalogue *cat); /* completes all waiting writes, then stops the writer */
 
 /* The catalogue stores these numbers. */
@@ -137,7 +147,7 @@ store_result catalogue_job_insert(catalogue *cat, job_row *row, const struct job
 store_result catalogue_job_list_it(catalogue *cat, const char *id); /* sets `listed` */
 /* queued → running with the next attempt. There is no heartbeat: the lock of the data folder ensures that only one
  * process runs jobs, so any job that is running in the catalogue at the start belongs to a dead process
- * (catalogue_recover()). Several processes would need a lease that (job, attempt) renews, to recognise a dead claim. */
+ * (catalogue_recover()). Several nodes claim with catalogue_claim_next() instead, which gives a lease (shared.h). */
 store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, int alone, int64_t now);
 /* running → queued again; its attempt does not count. */
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
@@ -165,6 +175,10 @@ int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, in
 /* After a crash: queues jobs that were running again, as suspects, and fails those that crashed alone `most_crashes`
  * times. most_crashes 0: the crash was not theirs; they are queued as they were. */
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
+/* Where several nodes share the jobs: queues those of this node's last life ("": it has none). */
+store_result catalogue_recover_own(catalogue *cat, const char *last_life);
+/* The same as catalogue_recover() for jobs of nodes whose lease has passed; does not wait for the commit. */
+void catalogue_recover_lost(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
 /* Unfinished jobs, oldest first, only those after sequence number `after`. */
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out);
 

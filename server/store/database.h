@@ -4,7 +4,7 @@
 
 #include "store/sql.h"
 
-enum { DATABASE_STATEMENTS = 96, DATABASE_READERS = 6 };
+enum { DATABASE_STATEMENTS = 128, DATABASE_READERS = 6 };
 
 /* A connection, for one thread at a time. Statements are cached by the address of their text. */
 typedef struct database {

@@ -7,9 +7,7 @@
 #include "store/rows.h"
 #include "store/usage.h"
 
-#define COLUMNS                                                                                                   \
-  "seq, id, key, kind, state, attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
-  " created, started, finished, charged, result"
+#define COLUMNS JOB_COLUMNS
 
 void job_row_free(job_row *row) {
   free(row->request);
@@ -59,6 +57,7 @@ typedef struct change {
   const job_row *row;
   int64_t now;
   const job_end *end;
+  const char *node; /* of several */
 } change;
 
 /* Runs an update that must change exactly one row. */
@@ -215,11 +214,12 @@ static int read_row(sql_statement *st, void *to) {
 static void release_row(void *row) {
   job_row_free(row);
 }
-static const row_kind job_rows = {read_row, release_row, sizeof(job_row)};
+const row_kind job_rows = {read_row, release_row, sizeof(job_row)};
 
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   database *db = catalogue_reader(cat);
-  sql_statement *st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE id=?1");
+  sql_statement *st = database_statement(db, database_either(db, "SELECT " COLUMNS " FROM job WHERE id=?1",
+                                                             "SELECT " JOB_COLUMNS_SHOWN " FROM job WHERE id=?1"));
   if (st) {
     sql_bind_text(st, 1, id);
   }
@@ -238,12 +238,14 @@ int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, in
        "SELECT " COLUMNS LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
       {"SELECT " COLUMNS LISTED NAMED("+seq") " ORDER BY +seq DESC LIMIT ?3",
        "SELECT " COLUMNS LISTED NAMED("+seq") " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
-  static const char *const named[2] = {
-      "SELECT " COLUMNS LISTED NAMED("seq") " ORDER BY seq DESC LIMIT ?3",
-      "SELECT " COLUMNS LISTED NAMED("seq") " AND owner=?4 ORDER BY seq DESC LIMIT ?3"};
+  static const char *const plain[2][2] = {
+      {"SELECT " JOB_COLUMNS_SHOWN LISTED "seq<?2 ORDER BY seq DESC LIMIT ?3",
+       "SELECT " JOB_COLUMNS_SHOWN LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
+      {"SELECT " JOB_COLUMNS_SHOWN LISTED NAMED("seq") " ORDER BY seq DESC LIMIT ?3",
+       "SELECT " JOB_COLUMNS_SHOWN LISTED NAMED("seq") " AND owner=?4 ORDER BY seq DESC LIMIT ?3"}};
   database *db = catalogue_reader(cat);
   sql_statement *st = database_statement(
-      db, prefix ? database_either(db, queries[1][owner != NULL], named[owner != NULL]) : queries[0][owner != NULL]);
+      db, database_either(db, queries[prefix != NULL][owner != NULL], plain[prefix != NULL][owner != NULL]));
   if (st && owner) {
     sql_bind_text(st, 4, owner);
   }
@@ -309,28 +311,17 @@ static int give_up(database *db, job_row *row, const change *c) {
   return code;
 }
 
-/* Retry after a crash: jobs that were running are queued again as suspects. A crash counts against a job only if it ran
- * alone, on purpose or because no other job was running. */
-static int recover(database *db, void *arg) {
-  const change *c = arg;
-  if (c->attempt == 0) {
-    return database_run(db, database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1"));
-  }
-  sql_statement *st = database_statement(db,
-                                         "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
-                                         " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");
-  int code = database_run(db, st);
-  if (code == SQL_OK) {
-    code = database_run(db, database_statement(db, "UPDATE job SET state=0, suspect=1, alone=0 WHERE state=1"));
-  }
-  while (code == SQL_OK) { /* rarely more than one job */
+/* Fails the queued jobs that have crashed alone too often; rarely more than one. */
+static int give_up_all(database *db, const change *c) {
+  for (;;) {
     job_row row;
-    st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE state=0 AND crashes>=?1 ORDER BY seq LIMIT 1");
+    sql_statement *st =
+        database_statement(db, "SELECT " COLUMNS " FROM job WHERE state=0 AND crashes>=?1 ORDER BY seq LIMIT 1");
     if (!st) {
       return SQL_ERROR;
     }
     sql_bind_integer(st, 1, c->attempt);
-    code = sql_step(st);
+    int code = sql_step(st);
     if (code == SQL_DONE) {
       sql_reset(st);
       return SQL_OK;
@@ -346,8 +337,78 @@ static int recover(database *db, void *arg) {
       code = give_up(db, &row, c);
       job_row_free(&row);
     }
+    if (code != SQL_OK) {
+      return code;
+    }
   }
-  return code;
+}
+
+/* Retry after a crash: jobs that were running are queued again as suspects. A crash counts against a job only if it ran
+ * alone, on purpose or because no other job was running. */
+static int recover(database *db, void *arg) {
+  const change *c = arg;
+  if (c->attempt == 0) {
+    return database_run(db, database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1"));
+  }
+  sql_statement *st = database_statement(db,
+                                         "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
+                                         " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");
+  int code = database_run(db, st);
+  if (code == SQL_OK) {
+    code = database_run(db, database_statement(db, "UPDATE job SET state=0, suspect=1, alone=0 WHERE state=1"));
+  }
+  return code == SQL_OK ? give_up_all(db, c) : code;
+}
+
+/* The jobs of this node's last life: its end was not theirs, as they have processes of their own. Those of other nodes
+ * that are gone: they may have been the cause, but for downloads. */
+static int recover_lost(database *db, void *arg) {
+  const change *c = arg;
+  sql_statement *st = database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1 AND node=?1 AND node<>''");
+  int code = SQL_ERROR;
+  if (st) {
+    sql_bind_text(st, 1, c->node);
+    code = database_run(db, st);
+  }
+  if (code != SQL_OK || !c->counts) {
+    return code;
+  }
+  st = code == SQL_OK
+           ? database_statement(db,
+                                "UPDATE job SET state=0, crashes=crashes+alone, alone=0,"
+                                " suspect=CASE kind WHEN 2 THEN 0 ELSE 1 END"
+                                " WHERE state=1 AND node NOT IN (SELECT name FROM node WHERE until>=clock_ms())")
+           : NULL;
+  code = st ? database_run(db, st) : code;
+  if (code == SQL_OK && sql_changes(db) > 0) {
+    log_warn("jobs of a node that was silent beyond its lease are queued again");
+  }
+  st = code == SQL_OK ? database_statement(db, "DELETE FROM node WHERE until<clock_ms() OR name=?1") : NULL;
+  if (st) {
+    sql_bind_text(st, 1, c->node);
+    code = database_run(db, st);
+  }
+  return code == SQL_OK ? give_up_all(db, c) : code;
+}
+
+store_result catalogue_recover_own(catalogue *cat, const char *last_life) {
+  change c = {.node = last_life};
+  return catalogue_write(cat, recover_lost, &c);
+}
+
+typedef struct lost_arg {
+  change change; /* first */
+  char problem[];
+} lost_arg;
+
+void catalogue_recover_lost(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem) {
+  size_t size = strlen(crash_problem) + 1;
+  lost_arg *a = calloc(1, sizeof *a + size);
+  if (a) {
+    memcpy(a->problem, crash_problem, size);
+    a->change = (change){.node = "", .counts = 1, .attempt = most_crashes, .now = now, .problem = a->problem};
+    catalogue_write_later(cat, recover_lost, a);
+  }
 }
 
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem) {

@@ -20,6 +20,7 @@
 #include "log.h"
 #include "metrics.h"
 #include "store/marks.h"
+#include "store/object_lock.h"
 #include "store/vault.h"
 
 static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset",   "places",
@@ -34,6 +35,8 @@ typedef struct held_object {
 
 struct objects {
   pthread_rwlock_t publishing;
+  object_lock *nodes;     /* that share the bucket; NULL: there are none */
+  int excludes, excluded; /* of the thread that holds `publishing` alone */
   pthread_mutex_t deleting;
   int backup_lock; /* −1: none */
   int holds_backups;
@@ -52,12 +55,13 @@ static store_result failed(const char *what, const char *path) {
   return code == ENOSPC || code == EDQUOT || code == EFBIG ? STORE_FULL : STORE_ERROR;
 }
 
-static void name_of(object_kind kind, const char *id, char out[VAULT_NAME]) {
-  snprintf(out, VAULT_NAME, "%s/%.2s/%.80s", folders[kind], id, id);
+_Static_assert((int)OBJECT_NAME == (int)VAULT_NAME, "a name of an object is one of the vault");
+
+void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]) {
+  snprintf(out, OBJECT_NAME, "%s/%.2s/%.80s", folders[kind], id, id);
 }
 
-/* 0: no name of an object. */
-static int read_name(const char *name, object_kind *kind, const char **id) {
+int objects_read_name(const char *name, object_kind *kind, const char **id) {
   size_t folder = strcspn(name, "/");
   const char *slash = strrchr(name, '/');
   for (int k = 0; slash && k < OBJECT_KINDS; k++) {
@@ -233,17 +237,39 @@ void objects_close(objects *store) {
   marks_destroy(store->verified);
   pthread_mutex_destroy(&store->deleting);
   pthread_rwlock_destroy(&store->publishing);
+  object_lock_close(store->nodes);
   free(store);
 }
 
+void objects_share(objects *store, object_lock *lock) {
+  store->nodes = lock;
+}
+
+/* Without the database no row is committed, so nothing is lost if the lock cannot be taken: a job that publishes
+ * ends only when the database is back, and nobody deletes an object that no row has named. */
 void objects_hold(objects *store) {
   pthread_rwlock_rdlock(&store->publishing);
+  if (store->nodes) {
+    object_lock_share(store->nodes);
+  }
 }
-void objects_exclude(objects *store) {
+int objects_exclude(objects *store) {
   pthread_rwlock_wrlock(&store->publishing);
+  store->excludes = 1;
+  store->excluded = !store->nodes || object_lock_exclude(store->nodes);
+  return store->excluded;
 }
 void objects_let_go(objects *store) {
+  if (store->nodes && !store->excludes) {
+    object_lock_unshare(store->nodes);
+  } else if (store->nodes && store->excluded) {
+    object_lock_let_go(store->nodes);
+  }
+  store->excludes = 0; /* set only while one thread has the lock alone */
   pthread_rwlock_unlock(&store->publishing);
+}
+int objects_still_excludes(objects *store) {
+  return store->excluded && (!store->nodes || object_lock_holds(store->nodes));
 }
 
 store_result objects_begin(objects *store, object_temp *temp) {
@@ -303,8 +329,8 @@ store_result objects_publish(objects *store, object_temp *temp, object_kind kind
     return status;
   }
   if (store->vault) {
-    char name[VAULT_NAME];
-    name_of(kind, id, name);
+    char name[OBJECT_NAME];
+    objects_name(kind, id, name);
     temp_path(temp, from);
     store_result status = vault_publish(store->vault, name, temp->fd, from);
     close(temp->fd);
@@ -360,8 +386,8 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
     return store->remote.read(store->remote.user, kind, id, fd, size);
   }
   if (store->vault) {
-    char name[VAULT_NAME];
-    name_of(kind, id, name);
+    char name[OBJECT_NAME];
+    objects_name(kind, id, name);
     return vault_read(store->vault, name, fd, size);
   }
   objects_path(store, kind, id, path);
@@ -381,8 +407,8 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
 store_result objects_look(const objects *store, object_kind kind, const char *id) {
   char path[PATH_MAX];
   if (store->vault) {
-    char name[VAULT_NAME];
-    name_of(kind, id, name);
+    char name[OBJECT_NAME];
+    objects_name(kind, id, name);
     return vault_look(store->vault, name);
   }
   objects_path(store, kind, id, path);
@@ -390,8 +416,8 @@ store_result objects_look(const objects *store, object_kind kind, const char *id
 }
 
 int objects_is_near(const objects *store, object_kind kind, const char *id) {
-  char name[VAULT_NAME];
-  name_of(kind, id, name);
+  char name[OBJECT_NAME];
+  objects_name(kind, id, name);
   return !store->vault || vault_copy(store->vault, name);
 }
 
@@ -405,8 +431,8 @@ int objects_are_away(const objects *store) {
 
 int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
                  char out[BUCKET_LINK]) {
-  char name[VAULT_NAME];
-  name_of(kind, id, name);
+  char name[OBJECT_NAME];
+  objects_name(kind, id, name);
   return store->vault && vault_link(store->vault, name, seconds, more, out);
 }
 
@@ -453,8 +479,8 @@ static void end_deleting(const objects *store) {
 static store_result unlink_object(const objects *store, object_kind kind, const char *id) {
   char path[PATH_MAX];
   if (store->vault) {
-    char name[VAULT_NAME];
-    name_of(kind, id, name);
+    char name[OBJECT_NAME];
+    objects_name(kind, id, name);
     return vault_delete(store->vault, name);
   }
   objects_path(store, kind, id, path);
@@ -507,7 +533,7 @@ static void heal_damaged(objects *store) {
     object_kind kind;
     const char *id;
     metrics_quarantined();
-    if (read_name(name, &kind, &id) && store->heal) {
+    if (objects_read_name(name, &kind, &id) && store->heal) {
       store->heal(store->heal_user, kind, id);
     }
   }
@@ -528,8 +554,7 @@ static held_object *take_held(objects *store) {
 void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user) {
   heal_damaged(store);
   for (held_object *one; (one = take_held(store)); free(one)) {
-    objects_exclude(store);
-    if (!is_named(user, one->kind, one->id)) {
+    if (objects_exclude(store) && !is_named(user, one->kind, one->id)) {
       objects_delete(store, one->kind, one->id);
     }
     objects_let_go(store);
@@ -541,8 +566,8 @@ static uint64_t hash_of(const objects *store, object_kind kind, const char *id) 
   char text[104];
   int n = snprintf(text, sizeof text, "%d %.80s", (int)kind, id);
   if (store->vault) {
-    char name[VAULT_NAME];
-    name_of(kind, id, name);
+    char name[OBJECT_NAME];
+    objects_name(kind, id, name);
     n += snprintf(text + n, sizeof text - (size_t)n, " %llx", (unsigned long long)vault_copy(store->vault, name));
   }
   return keyed_hash(text, n < (int)sizeof text ? (size_t)n : sizeof text - 1);
@@ -587,12 +612,12 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
   size_t n = strlen(aside);
   snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", folders[kind], id, (long long)time(NULL));
   if (result == STORE_OK && store->vault) {
-    char name[VAULT_NAME];
-    name_of(kind, id, name);
+    char name[OBJECT_NAME];
+    objects_name(kind, id, name);
     result = vault_quarantine(store->vault, name, fd, aside);
     moved = result == STORE_NOT_FOUND;
   } else if (result == STORE_OK) {
-    objects_exclude(store);
+    (void)objects_exclude(store); /* files: there are no other nodes */
     result = move_aside(path, aside, fd, &moved);
     objects_let_go(store);
   }
@@ -615,8 +640,8 @@ store_result objects_set_aside(objects *store, object_kind kind, const char *id)
   size_t n = strlen(aside);
   snprintf(aside + n, sizeof aside - n, "/%s-%s", folders[kind], id);
   if (result == STORE_OK && store->vault) {
-    char name[VAULT_NAME];
-    name_of(kind, id, name);
+    char name[OBJECT_NAME];
+    objects_name(kind, id, name);
     result = vault_set_aside(store->vault, name, aside);
   } else if (result == STORE_OK && rename(path, aside) != 0) {
     result = failed("rename to", aside);
@@ -668,7 +693,7 @@ static void visit(void *user, const char *name, uint64_t size) {
   const named_visit *v = user;
   object_kind kind;
   const char *id;
-  if (read_name(name, &kind, &id)) {
+  if (objects_read_name(name, &kind, &id)) {
     v->each(v->user, kind, id, size);
   }
 }

@@ -71,8 +71,14 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
  * then its objects calls objects_exclude() first, which waits for all holders. The same thread calls objects_let_go()
  * afterwards. */
 void objects_hold(objects *store);
-void objects_exclude(objects *store);
+/* 0: nodes that share the bucket could not be excluded; nothing may be deleted. */
+int objects_exclude(objects *store);
 void objects_let_go(objects *store);
+/* Whether the caller of objects_exclude() still excludes other nodes; asked before an object is deleted. */
+int objects_still_excludes(objects *store);
+/* The bucket is shared with other nodes; the store closes the lock. */
+struct object_lock;
+void objects_share(objects *store, struct object_lock *lock);
 
 /* Opens an object for reading; the caller closes *fd. */
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size);
@@ -88,6 +94,11 @@ int objects_are_away(const objects *store);
 /* A URL from which anyone may read an object for so many seconds; more: see s3_presign(). 0: there is none. */
 int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
                  char out[BUCKET_LINK]);
+/* The name of an object in a bucket. */
+enum { OBJECT_NAME = 100 };
+void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]);
+/* id: within the name. 0: it is no name of an object. */
+int objects_read_name(const char *name, object_kind *kind, const char **id);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
 /* Makes the folder of that file, if it is not there. */

@@ -8,19 +8,26 @@
 #include <unistd.h>
 
 #include "log.h"
+#include "store/object_lock.h"
 
-enum { MARK = 2 * CATALOGUE_SECRET + 1 };
+enum { MARK = PLACE_MARK };
+const char place_catalogue[] = "catalogue.postgresql", place_objects[] = "objects.s3";
 
 static void path_in(const char *data, const char *name, char out[PATH_MAX]) {
   snprintf(out, PATH_MAX, "%s/%s", data, name);
 }
 
+void place_hash(const unsigned char secret[CATALOGUE_SECRET], char out[PLACE_MARK]) {
+  unsigned char hash[crypto_hash_sha256_BYTES];
+  crypto_hash_sha256(hash, secret, CATALOGUE_SECRET);
+  sodium_bin2hex(out, PLACE_MARK, hash, CATALOGUE_SECRET);
+}
+
 /* A hash that identifies a catalogue. */
 static store_result mark_of(catalogue *cat, char out[MARK]) {
-  unsigned char secret[CATALOGUE_SECRET], hash[crypto_hash_sha256_BYTES];
+  unsigned char secret[CATALOGUE_SECRET];
   store_result result = catalogue_secret(cat, secret);
-  crypto_hash_sha256(hash, secret, sizeof secret);
-  sodium_bin2hex(out, MARK, hash, CATALOGUE_SECRET);
+  place_hash(secret, out);
   sodium_memzero(secret, sizeof secret);
   return result;
 }
@@ -57,6 +64,22 @@ static store_result write_mark(const char *data, const char *path, const char ma
   return fine ? STORE_OK : STORE_ERROR;
 }
 
+store_result place_read_mark(const char *data, const char *name, char out[PLACE_MARK]) {
+  char path[PATH_MAX];
+  path_in(data, name, path);
+  store_result result = read_mark(path, out);
+  if (result != STORE_OK) {
+    log_error("%s cannot be read, or is damaged", path);
+  }
+  return result;
+}
+
+store_result place_write_mark(const char *data, const char *name, const char mark[PLACE_MARK]) {
+  char path[PATH_MAX];
+  path_in(data, name, path);
+  return write_mark(data, path, mark);
+}
+
 static store_result match(const char *data, const char *path, const char *there, catalogue *cat) {
   char mark[MARK];
   store_result result = mark_of(cat, mark);
@@ -76,7 +99,8 @@ static store_result match(const char *data, const char *path, const char *there,
   return STORE_UNFIT;
 }
 
-static store_result open_url(const char *data, const char *url, const char *path, const char *mark, catalogue **out) {
+static store_result open_url(const char *data, const char *url, int shared, const char *path, const char *mark,
+                             catalogue **out) {
   char own[PATH_MAX];
   path_in(data, "catalogue.sqlite", own);
   if (access(own, F_OK) == 0) {
@@ -85,7 +109,7 @@ static store_result open_url(const char *data, const char *url, const char *path
         data);
     return STORE_UNFIT;
   }
-  store_result result = catalogue_open(url, out);
+  store_result result = catalogue_open_shared(url, shared, out);
   if (result == STORE_OK) {
     result = match(data, path, mark, *out);
     if (result != STORE_OK) {
@@ -97,14 +121,18 @@ static store_result open_url(const char *data, const char *url, const char *path
 }
 
 store_result catalogue_open_at(const char *data, const char *url, catalogue **out) {
+  return catalogue_open_among(data, url, 0, out);
+}
+
+store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out) {
   char path[PATH_MAX], mark[MARK];
-  path_in(data, "catalogue.postgresql", path);
+  path_in(data, place_catalogue, path);
   if (read_mark(path, mark) != STORE_OK) {
     log_error("%s cannot be read, or is damaged", path);
     return STORE_ERROR;
   }
   if (url) {
-    return open_url(data, url, path, mark, out);
+    return open_url(data, url, shared, path, mark, out);
   }
   if (*mark) {
     log_error("the catalogue of %s is in PostgreSQL: name its URL with --catalogue", data);
@@ -120,7 +148,7 @@ static void note_file(void *user, object_kind kind, const char *id, uint64_t siz
   *(int *)user = 1;
 }
 
-static int has_files(const char *data) {
+int place_has_files(const char *data) {
   objects *files;
   int found = 0;
   if (objects_open_read_only(data, &files) == STORE_OK) {
@@ -130,7 +158,7 @@ static int has_files(const char *data) {
   return found;
 }
 
-static int has_catalogue(const char *data) {
+int place_has_catalogue(const char *data) {
   char path[PATH_MAX];
   path_in(data, "catalogue.sqlite", path);
   return access(path, F_OK) == 0;
@@ -138,16 +166,20 @@ static int has_catalogue(const char *data) {
 
 /* What can be said before the catalogue is opened, which may create it. here: the mark of the data folder. */
 static store_result match_bucket(const store_place *p, const char *here, const char *owner) {
+  if (strncmp(owner, PLACE_MIGRATING, strlen(PLACE_MIGRATING)) == 0) {
+    log_error("orbmorphd migrate has filled the bucket of --objects in part: run it again until it ends");
+    return STORE_UNFIT;
+  }
   if (*here && !*owner) {
     log_error("the bucket of --objects has none of the objects of %s: name the bucket and prefix that they are in",
               p->data);
     return STORE_UNFIT;
   }
-  if ((*here && strcmp(here, owner) != 0) || (!*here && *owner && !p->catalogue && !has_catalogue(p->data))) {
+  if ((*here && strcmp(here, owner) != 0) || (!*here && *owner && !p->catalogue && !place_has_catalogue(p->data))) {
     log_error("the bucket of --objects belongs to another deployment than %s: name another bucket or prefix", p->data);
     return STORE_UNFIT;
   }
-  if (!*here && has_files(p->data)) {
+  if (!*here && place_has_files(p->data)) {
     log_error("the objects of %s are files: start without --objects, or name a new data folder", p->data);
     return STORE_UNFIT;
   }
@@ -178,13 +210,19 @@ static store_result open_bucket(const store_place *p, const char *path, const ch
     return result;
   }
   result = match_bucket(p, here, owner);
-  result = result == STORE_OK ? catalogue_open_at(p->data, p->catalogue, cat) : result;
+  result = result == STORE_OK ? catalogue_open_among(p->data, p->catalogue, p->catalogue != NULL, cat) : result;
   result = result == STORE_OK ? claim(p, path, here, owner, b, *cat) : result;
   if (result != STORE_OK) {
     bucket_close(b);
     return result;
   }
-  return objects_open_bucket(p->data, b, p->cache, store);
+  result = objects_open_bucket(p->data, b, p->cache, store);
+  if (result == STORE_OK && catalogue_is_shared(*cat)) {
+    object_lock *lock = object_lock_open(p->catalogue);
+    result = lock ? STORE_OK : STORE_ERROR;
+    objects_share(*store, lock);
+  }
+  return result;
 }
 
 store_place store_place_of(const config *options) {
@@ -198,7 +236,7 @@ store_place store_place_of(const config *options) {
 
 store_result stores_open(const store_place *place, objects **store, catalogue **cat) {
   char path[PATH_MAX], mark[MARK];
-  path_in(place->data, "objects.s3", path);
+  path_in(place->data, place_objects, path);
   if (read_mark(path, mark) != STORE_OK) {
     log_error("%s cannot be read, or is damaged", path);
     return STORE_ERROR;

@@ -15,6 +15,22 @@
  * written, its schema is newer than this program, or it refuses the credentials; nothing was written, and the log says
  * what is wrong. */
 store_result catalogue_open_at(const char *data, const char *url, catalogue **out);
+/* shared: a database in PostgreSQL is one of several nodes, as it is where objects are in a bucket. */
+store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out);
+
+/* What ties them together: a hash of the catalogue's secret, in these two files of the data folder and in the bucket.
+ */
+enum { PLACE_MARK = 2 * CATALOGUE_SECRET + 1 };
+extern const char place_catalogue[], place_objects[];
+void place_hash(const unsigned char secret[CATALOGUE_SECRET], char out[PLACE_MARK]);
+/* name: of the file. out: "" where there is none. */
+store_result place_read_mark(const char *data, const char *name, char out[PLACE_MARK]);
+store_result place_write_mark(const char *data, const char *name, const char mark[PLACE_MARK]);
+/* Whether the data folder has objects in files, and whether it has a catalogue in SQLite. */
+int place_has_files(const char *data);
+int place_has_catalogue(const char *data);
+/* What a bucket's owner begins with while `orbmorphd migrate` fills the bucket. */
+#define PLACE_MIGRATING "migrating-"
 
 typedef struct store_place {
   const char *data;

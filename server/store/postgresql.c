@@ -16,7 +16,9 @@
 #include "log.h"
 #include "store/sql.h"
 
-enum { PARAMETERS = 16, NUMBER = 24, MESSAGE = 400, LOCK = 0x6f726d, LOCK_TRIES = 60, OID_BIGINT = 20, OID_TEXT = 25 };
+enum { PARAMETERS = 32, NUMBER = 24, MESSAGE = 400, LOCK_TRIES = 60, OID_BIGINT = 20, OID_TEXT = 25 };
+/* Advisory locks; the second key is the schema. */
+enum { LOCK = SQL_LOCK, LOCK_OF_SCHEMA = SQL_LOCK + 1 };
 
 #define LOCK_WAIT_NS 50000000
 
@@ -87,17 +89,23 @@ static int refuse(connection *c, int code, const char *why) {
   return code;
 }
 
-/* The server may not have noticed yet that a daemon that died has gone. */
+/* The server may not have noticed yet that a daemon that died has gone. Nodes share the lock; the first connection of a
+ * node also holds the lock of migrations until hold(). */
 static int lock(connection *c) {
   char sql[128];
   int64_t locked = 0;
   int code = SQL_OK;
-  snprintf(sql, sizeof sql, "SELECT pg_try_advisory_lock(%d, hashtext(current_schema()))::int", LOCK);
+  snprintf(sql, sizeof sql, "SELECT pg_try_advisory_lock%s(%d, hashtext(current_schema()))::int",
+           c->writer == SQL_SHARES ? "_shared" : "", LOCK);
   for (int i = 0; i < LOCK_TRIES && code == SQL_OK && !locked; i++) {
     if (i > 0) {
       nanosleep(&(struct timespec){.tv_nsec = LOCK_WAIT_NS}, NULL);
     }
     code = run(c, sql, &locked);
+  }
+  if (code == SQL_OK && locked && c->writer == SQL_SHARES && c->generation == 1) {
+    snprintf(sql, sizeof sql, "SELECT pg_advisory_lock(%d, hashtext(current_schema()))", LOCK_OF_SCHEMA);
+    code = run(c, sql, NULL);
   }
   return code == SQL_OK && !locked ? refuse(c, SQL_BUSY, "another orbmorphd uses it") : code;
 }
@@ -135,10 +143,52 @@ static int begin(connection *c) {
                  "SET tcp_keepalives_count=3",
                  NULL);
   c->generation++;
+  if (code == SQL_OK && c->writer == SQL_SHARES) { /* other nodes wait for its transaction */
+    code = run(c, "SET idle_in_transaction_session_timeout='5s'", NULL);
+  }
   if (code == SQL_OK) {
     code = c->writer ? begin_writer(c) : run(c, "SET default_transaction_read_only=on", NULL);
   }
   return code;
+}
+
+/* Whether the last connection that was tried could not be made. __atomic; of all connections of the process. */
+static int away;
+
+/* A connection that the network swallows fails only after seconds: while the server is away, one caller tries at a
+ * time.
+ */
+enum { AGAIN_MS = 500 };
+static int64_t tried; /* when a connection was last tried in vain; __atomic */
+
+static int64_t now_ms(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static int is_too_soon(void) {
+  int64_t last = __atomic_load_n(&tried, __ATOMIC_RELAXED), now = now_ms();
+  return sql_postgresql_is_away() &&
+         (now - last < AGAIN_MS ||
+          !__atomic_compare_exchange_n(&tried, &last, now, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED));
+}
+
+int sql_postgresql_is_away(void) {
+  return __atomic_load_n(&away, __ATOMIC_RELAXED);
+}
+
+static int64_t failed_at; /* when it last did not answer, as now_ms(); __atomic */
+
+int64_t sql_postgresql_failed_at(void) {
+  return __atomic_load_n(&failed_at, __ATOMIC_RELAXED);
+}
+
+void sql_postgresql_note(int is_away) {
+  if (is_away) {
+    __atomic_store_n(&failed_at, now_ms(), __ATOMIC_RELAXED);
+  }
+  __atomic_store_n(&away, is_away, __ATOMIC_RELAXED);
 }
 
 static int is_lost(const connection *c) {
@@ -150,14 +200,22 @@ static int restore(connection *c) {
   if (!is_lost(c)) {
     return SQL_OK;
   }
+  const int known = sql_postgresql_is_away();
+  if (is_too_soon()) {
+    return refuse(c, SQL_IOERR, "the database does not answer");
+  }
   PQreset(c->server);
+  sql_postgresql_note(PQstatus(c->server) != CONNECTION_OK);
+  __atomic_store_n(&tried, now_ms(), __ATOMIC_RELAXED);
   int code = PQstatus(c->server) == CONNECTION_OK ? begin(c) : failed(c, NULL);
   if (code == SQL_OK) {
     log_info("catalogue: connected to the database again");
   } else {
     char why[MESSAGE];
     memcpy(why, c->message, sizeof why);
-    log_error("catalogue: the connection to the database was lost: %s", why);
+    if (!known) {
+      log_error("catalogue: the connection to the database was lost: %s", why);
+    }
     if (PQstatus(c->server) == CONNECTION_OK) {
       run(c, "SELECT pg_terminate_backend(pg_backend_pid())", NULL); /* so that the next call tries again */
     }
@@ -182,7 +240,7 @@ static int execute(sql_connection *c, const char *sql) {
   if (code != SQL_OK && !within && is_lost(to) && (code = restore(to)) == SQL_OK) {
     code = run(to, sql, NULL);
   }
-  if (code != SQL_OK) {
+  if (code != SQL_OK && !sql_postgresql_is_away()) {
     log_error("catalogue: %.60s: %s", sql, to->message);
   }
   return code;
@@ -412,9 +470,14 @@ static int version(sql_connection *c, int *version) {
   return code;
 }
 
-/* Numbers the daemon that holds the lock. */
+/* Numbers the daemon that holds the lock alone. */
 static int hold(sql_connection *c) {
   connection *to = c->native;
+  char sql[96];
+  if (to->writer == SQL_SHARES) {
+    snprintf(sql, sizeof sql, "SELECT pg_advisory_unlock(%d, hashtext(current_schema()))", LOCK_OF_SCHEMA);
+    return run(to, sql, NULL);
+  }
   return run(to, "UPDATE catalogue SET holder=holder+1 RETURNING holder", &to->holder);
 }
 

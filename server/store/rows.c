@@ -3,7 +3,9 @@
 #include <stdlib.h>
 
 static void complain(const database *db) {
-  log_error("catalogue: rows cannot be read: %s", db->connection.driver->message(&db->connection));
+  if (!sql_postgresql_is_away()) { /* the log has that */
+    log_error("catalogue: rows cannot be read: %s", db->connection.driver->message(&db->connection));
+  }
 }
 
 static void release(const row_kind *kind, void *row) {

@@ -23,6 +23,15 @@ typedef struct row_kind {
 /* A description for a list: that of landmarks, which ends with them, without them. */
 #define ROW_SUMMARY(kind, json) \
   "iif(" kind "=3, substr(" json ", 1, instr(" json ", ',\"landmarks\":')-1)||'}', " json ")"
+/* Of a job: these columns. */
+#define JOB_COLUMNS JOB_COLUMNS_WITH("state")
+/* As callers see it, where several nodes share the jobs: one that waits for jobs runs when they do. */
+#define JOB_COLUMNS_SHOWN JOB_COLUMNS_WITH("CASE WHEN state=0 AND waits>0 AND started>0 THEN 1 ELSE state END")
+#define JOB_COLUMNS_WITH(state)                                                          \
+  "seq, id, key, kind, " state                                                           \
+  ", attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
+  " created, started, finished, charged, result"
+extern const row_kind job_rows;
 extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created,
                                       * places, quantized, meshopt */
 

@@ -332,7 +332,7 @@ static void explain(s3_answer *out) {
            *message ? ": " : "", message);
 }
 
-static void pause_before(int tried) {
+void s3_pause(int tried) {
   long mean = (long)PAUSE_MS << tried;
   long ms = mean / 2 + (long)randombytes_uniform((uint32_t)mean);
   struct timespec time = {ms / 1000, ms % 1000 * 1000000};
@@ -360,7 +360,7 @@ void s3_send(s3 *store, const s3_request *request, s3_answer *out) {
       return;
     }
     free(out->text);
-    pause_before(tried);
+    s3_pause(tried);
   }
 }
 

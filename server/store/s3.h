@@ -48,6 +48,8 @@ void s3_use_keys(s3 *store, const s3_keys *keys);
 /* Sends a request, again after 5xx, 429, a lost connection or half an answer, after pauses that grow and are drawn at
  * random. The caller frees out->text. */
 void s3_send(s3 *store, const s3_request *request, s3_answer *out);
+/* The pause after so many tries before, from 0. */
+void s3_pause(int tried);
 /* A URL that lets anyone GET an object for so many seconds. more: see s3_presign(). 0: it does not fit. */
 int s3_link(s3 *store, const char *key, long seconds, const char *more, char *out, size_t size);
 

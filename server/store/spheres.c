@@ -114,18 +114,41 @@ store_result spheres_find(const objects *store, const char *id, int shape, uint6
   return result;
 }
 
+/* Hashes the first bytes of a file in parts, so that its size does not matter. */
+static int hash_first(int fd, uint64_t size, unsigned char hash[HASH_BYTES]) {
+  enum { BLOCK = 1 << 18 };
+  unsigned char *block = malloc(BLOCK);
+  crypto_hash_sha256_state state;
+  int fine = block != NULL;
+  crypto_hash_sha256_init(&state);
+  for (uint64_t at = 0; fine && at < size; at += BLOCK) {
+    size_t part = size - at < BLOCK ? (size_t)(size - at) : BLOCK;
+    fine = read_at(fd, block, part, at);
+    crypto_hash_sha256_update(&state, block, fine ? part : 0);
+  }
+  crypto_hash_sha256_final(&state, hash);
+  free(block);
+  return fine;
+}
+
+store_result spheres_check_file(int fd, uint64_t size) {
+  unsigned char tail[TAIL_BYTES], hash[HASH_BYTES];
+  if (size <= TAIL_BYTES) {
+    return STORE_CONFLICT;
+  }
+  if (!read_at(fd, tail, sizeof tail, size - TAIL_BYTES) || !hash_first(fd, size - TAIL_BYTES, hash)) {
+    return STORE_ERROR;
+  }
+  return memcmp(tail + HASH_BYTES + 4, mark, 8) == 0 && memcmp(tail, hash, HASH_BYTES) == 0 ? STORE_OK : STORE_CONFLICT;
+}
+
 store_result spheres_check(const objects *store, const char *id) {
-  unsigned char *bytes = NULL, hash[HASH_BYTES];
-  size_t size;
-  store_result result = objects_load(store, OBJECT_SPHERES, id, &bytes, &size);
-  if (result != STORE_OK) {
-    return result;
+  int fd;
+  uint64_t size;
+  store_result result = objects_read(store, OBJECT_SPHERES, id, &fd, &size);
+  if (result == STORE_OK) {
+    result = spheres_check_file(fd, size);
+    close(fd);
   }
-  int fine = size > TAIL_BYTES && memcmp(bytes + size - 8, mark, 8) == 0;
-  if (fine) {
-    crypto_hash_sha256(hash, bytes, size - TAIL_BYTES);
-    fine = memcmp(hash, bytes + size - TAIL_BYTES, HASH_BYTES) == 0;
-  }
-  free(bytes);
-  return fine ? STORE_OK : STORE_CONFLICT;
+  return result;
 }

@@ -23,5 +23,7 @@ store_result spheres_find(const objects *store, const char *id, int shape, uint6
 
 /* Verifies the object's hash. STORE_NOT_FOUND: no object. */
 store_result spheres_check(const objects *store, const char *id);
+/* The same of a file with the object's bytes. */
+store_result spheres_check_file(int fd, uint64_t size);
 
 #endif

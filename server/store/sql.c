@@ -17,6 +17,7 @@ const char *sql_reason(int code) {
       [SQL_CORRUPT] = "database disk image is malformed",
       [SQL_NOTADB] = "file is not a database",
       [SQL_SCHEMA] = "the schema is newer than this program",
+      [SQL_UNFINISHED] = "orbmorphd migrate has not ended there: run it again",
   };
   return code >= 0 && code < SQL_CODES ? reasons[code] : "unknown error";
 }

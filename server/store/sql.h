@@ -26,7 +26,8 @@ enum sql_code {
   SQL_CANTOPEN,
   SQL_CORRUPT,
   SQL_NOTADB,
-  SQL_SCHEMA, /* of a newer program */
+  SQL_SCHEMA,     /* of a newer program */
+  SQL_UNFINISHED, /* the half of another catalogue, see store/move_mark.h */
   SQL_CODES
 };
 const char *sql_reason(int code); /* in words */
@@ -41,8 +42,14 @@ typedef struct sql_statement {
   void *native;
 } sql_statement;
 
+/* What a connection may do: read; write, and create the database if there is none; write beside other nodes. */
+enum { SQL_READS, SQL_WRITES, SQL_SHARES };
+/* Advisory locks of PostgreSQL. The first is of the connection that writes, the next of migrations, then of
+ * transactions of nodes, of housekeeping, and of publishing and deleting objects. */
+enum { SQL_LOCK = 0x6f726d, SQL_LOCK_WRITES = SQL_LOCK + 2, SQL_LOCK_HOUSE, SQL_LOCK_OBJECTS };
+
 typedef struct sql_driver {
-  /* writer: may write, and creates the database if there is none. The caller closes also what could not be opened. */
+  /* writer: one of the above. The caller closes also what could not be opened. */
   int (*open)(const char *where, int writer, sql_connection *out);
   void (*close)(sql_connection *c);
   const char *(*message)(const sql_connection *c);    /* of the last error */
@@ -72,6 +79,10 @@ typedef struct sql_driver {
 extern const sql_driver sql_sqlite; /* where: the path of its file */
 /* where: a URL, postgresql://…. One connection that writes at a time: SQL_BUSY if another process has one. */
 extern const sql_driver sql_postgresql;
+/* Whether the server did not answer when it was last tried. The second notes that. */
+int sql_postgresql_is_away(void);
+void sql_postgresql_note(int is_away);
+int64_t sql_postgresql_failed_at(void); /* when that was last so, in ms of the monotonic clock; 0: never */
 
 static inline void sql_bind_text(sql_statement *st, int parameter, const char *text) {
   st->driver->bind_text(st, parameter, text);

@@ -1,5 +1,6 @@
 #include "worker/confined.h"
 
+#include <malloc.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -9,7 +10,7 @@
 #include "isolate/task.h"
 #include "worker/run.h"
 
-enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, PROGRESS_MS = 20 };
+enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, PROGRESS_MS = 20, KEPT_BYTES = 16 << 20 };
 
 typedef struct input {
   input_head head;
@@ -113,17 +114,26 @@ static _Noreturn void run_job_task(confined *c) {
   task_end(c->channel, &done, out.row.json, &problem);
 }
 
-static _Noreturn void run_check_task(confined *c) {
+/* The file is the frame's descriptor. */
+static void check_one(confined *c, const frame *f) {
   api_problem problem = {0};
   api_text json = {0};
   done_head done = {0};
   orb_context *ctx = make_context(c, NULL);
-  if (!ctx || c->count != 1) {
+  if (!ctx || f->fd < 0) {
     _exit(1);
   }
   FAULT_POINT("check-begun");
-  done.fine = intake_check_here(&c->task, c->inputs[0].fd, ctx, &json, &problem);
-  task_end(c->channel, &done, json.data, &problem);
+  done.fine = intake_check_here(&c->task, f->fd, ctx, &json, &problem);
+  if (!c->task.again) {
+    task_end(c->channel, &done, json.data, &problem);
+  }
+  orb_context_destroy(ctx);
+  if (task_answer(c->channel, &done, json.data, &problem) != CHANNEL_OK) {
+    _exit(1);
+  }
+  api_text_free(&json);
+  api_problem_free(&problem);
 }
 
 /* The daemon sent these frames, so what does not fit is a bug: the process ends. */
@@ -138,17 +148,44 @@ static void take_input(confined *c, frame *f) {
   in->json = strdup((const char *)f->bytes + sizeof in->head);
 }
 
+static void take_task(confined *c, frame *f) {
+  channel_result got = channel_receive(c->channel, CHANNEL_MOST, f, NULL, NULL);
+  if (got == CHANNEL_CLOSED) {
+    _exit(0); /* the daemon needs this process no more */
+  }
+  if (got != CHANNEL_OK || f->type != FRAME_TASK || f->size < sizeof c->task) {
+    _exit(1);
+  }
+  memcpy(&c->task, f->bytes, sizeof c->task);
+}
+
+/* The heap of a process that checks several files stays: what is given back between two files is faulted in again page
+ * by page. KEPT_BYTES: more than files of READER_BYTES take; larger blocks are mapped by core alone. */
+_Noreturn static void run_checks(confined *c, frame *f) {
+  if (c->task.again) {
+    (void)mallopt(M_TRIM_THRESHOLD, KEPT_BYTES);
+    (void)mallopt(M_MMAP_THRESHOLD, KEPT_BYTES);
+  }
+  for (;;) {
+    check_one(c, f);
+    frame_free(f);
+    take_task(c, f);
+    if (c->task.kind != TASK_CHECK) {
+      _exit(1);
+    }
+  }
+}
+
 void confined_work(int channel) {
   confined c = {.channel = channel};
   frame f;
-  if (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) != CHANNEL_OK || f.type != FRAME_TASK ||
-      f.size < sizeof c.task) {
-    _exit(1);
+  take_task(&c, &f);
+  task_confine(&c.task);
+  if (c.task.kind == TASK_CHECK) {
+    run_checks(&c, &f);
   }
-  memcpy(&c.task, f.bytes, sizeof c.task);
   c.request = strdup((const char *)f.bytes + sizeof c.task);
   frame_free(&f);
-  task_confine(&c.task);
   while (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) == CHANNEL_OK && f.type == FRAME_INPUT) {
     take_input(&c, &f);
     frame_free(&f);
@@ -157,8 +194,5 @@ void confined_work(int channel) {
     _exit(1);
   }
   frame_free(&f);
-  if (c.task.kind == TASK_CHECK) {
-    run_check_task(&c);
-  }
   run_job_task(&c);
 }

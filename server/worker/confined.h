@@ -2,7 +2,7 @@
 #ifndef ORB_WORKER_CONFINED_H
 #define ORB_WORKER_CONFINED_H
 
-/* Runs the task that the channel brings: a job, or the check of an upload. Ends the process. */
+/* Runs the task that the channel brings: a job, or checks of uploads. Ends the process. */
 void confined_work(int channel);
 
 #endif

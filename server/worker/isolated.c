@@ -271,6 +271,7 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
   task_head task = {.kind = kind == API_JOB_EMBEDDING ? TASK_EMBEDDING : TASK_SUPERMESH,
                     .threads = limits->threads,
                     .nice = limits->nice,
+                    .limit = limits->memory,
                     .memory = limits->memory,
                     .inputs = inputs.bytes,
                     .deadline_ms = limits->deadline_ms,

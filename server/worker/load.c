@@ -11,7 +11,8 @@ void run_problem_of_store(store_result result, api_problem *problem) {
   if (result == STORE_FULL) {
     api_refuse(problem, "storage-full", "The server's disk is full; free some space and try again.");
   } else {
-    api_refuse(problem, "internal", "The store could not be read or written; the server's log says why.");
+    api_refuse(problem, "internal",
+               "The store could not be read or written. Try again later; the daemon's log tells the operator why.");
   }
 }
 
@@ -73,7 +74,7 @@ static orb_status copy_file(orb_context *ctx, const orb_mesh *mesh, orb_format f
     memcpy(out->bytes, bytes, size);
     out->size = size;
   }
-  return orb_mesh_copy(ctx, mesh, &out->mesh);
+  return out->wants_mesh ? orb_mesh_copy(ctx, mesh, &out->mesh) : ORB_OK;
 }
 
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
@@ -125,8 +126,10 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
   const unsigned char *first = fine ? sphere_points(bytes, size, mesh->vertex_count, mesh->triangle_count) : NULL;
   if (!first) {
     free(bytes);
-    return api_refuse(problem, "corrupt", "The stored embedding %s cannot be read or does not match its mesh.",
-                      embedding);
+    return api_refuse(
+        problem, "corrupt",
+        "The stored embedding %s cannot be read or does not match its mesh: DELETE it and request it again.",
+        embedding);
   }
   *points = orb_alloc(ctx, 3 * count, sizeof **points);
   for (size_t v = 0; *points && v < count; v++) {

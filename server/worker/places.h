@@ -24,7 +24,4 @@
 ORB_MUST_CHECK orb_status places_write(orb_context *ctx, const orb_mesh *meshes, int32_t *const *corners,
                                        const orb_merge_result *merged, orb_buffer *out);
 
-/* Converts a place on the repaired mesh to a place in the file; triangle −1 if the file has no such triangle. */
-void places_to_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out);
-
 #endif

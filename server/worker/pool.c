@@ -239,6 +239,11 @@ static int lacks_memory(orb_context *ctx, const api_problem *problem) {
   return problem->name ? strcmp(problem->name, "no-memory") == 0 : orb_context_error(ctx)->status == ORB_E_NO_MEMORY;
 }
 
+/* Whether a job that ran since `began` may have failed because a store was away. */
+static int may_be_store(const run_env *env, int64_t began) {
+  return objects_are_away(env->store) || catalogue_was_away(env->cat, began);
+}
+
 static void run_claimed(worker_pool *pool, job *j, int threads) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env_of_job = pool->env, *env = &env_of_job;
@@ -271,8 +276,8 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
     }
     queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
-  } else if (out.gone || (objects_are_away(env->store) && !queue_cancel_wanted(env->q, j))) {
-    queue_give_back(env->q, j); /* a worker plans it again, once S3 is back */
+  } else if (out.gone || (may_be_store(env, began) && !queue_cancel_wanted(env->q, j))) {
+    queue_give_back(env->q, j); /* a worker plans it again, once the stores are back */
   } else if (!lacks_memory(ctx, &problem) || !queue_needs_memory(env->q, j)) {
     finish_failed(env, j, ctx, &problem);
   }

@@ -64,7 +64,8 @@ typedef struct file_triangle {
 
 /* The file of a shape; memory of the context. */
 typedef struct run_file {
-  orb_mesh mesh;        /* from before the repair */
+  int wants_mesh;       /* set by the caller */
+  orb_mesh mesh;        /* from before the repair, if that is wanted */
   unsigned char *bytes; /* NULL unless the file is glTF or GLB */
   size_t size;
 } run_file;

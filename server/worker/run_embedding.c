@@ -8,8 +8,9 @@
 static int read_request(const run_job *j, api_embedding_request *request, api_problem *problem) {
   api_json_error error;
   cJSON *body = api_json_parse(j->request, strlen(j->request), &error);
-  int fine = body ? api_embedding_request_read(body, request, problem)
-                  : api_refuse(problem, "corrupt", "The stored request of the job does not decode.");
+  int fine =
+      body ? api_embedding_request_read(body, request, problem)
+           : api_refuse(problem, "corrupt", "The stored request of the job cannot be read: send the request again.");
   cJSON_Delete(body);
   return fine;
 }

@@ -136,7 +136,8 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
     budget_wait(d->options->memory, BUDGET_CHECKS, memory);
     const intake_limits limits = {.memory = memory,
                                   .deadline_ms = orb_clock_ms() + d->options->check_ms,
-                                  .max_triangles = d->options->max_triangles};
+                                  .max_triangles = d->options->max_triangles,
+                                  .part = BUDGET_CHECKS};
     stored = intake_store(&file, env->cat, env->store, d->ctx, &limits, job_owner(j), wish->quota, &fresh, problem);
     budget_give(d->options->memory, BUDGET_CHECKS, memory, NULL);
     sem_post(d->options->checks);

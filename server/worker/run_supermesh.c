@@ -14,7 +14,8 @@ typedef struct merge_input {
   api_supermesh_request request;
   orb_mesh meshes[API_SHAPES_MAX];
   int32_t *corners[API_SHAPES_MAX]; /* see run_load_mesh() */
-  run_file file;                    /* the first shape, for the method template */
+  run_file files[API_SHAPES_MAX];   /* the first one for the method template; those that "transfer" names */
+  orb_shape_file shape_files[API_SHAPES_MAX];
   double *points[API_SHAPES_MAX];
   orb_align_shape shapes[API_SHAPES_MAX];
   const char *names[API_SHAPES_MAX];
@@ -30,9 +31,9 @@ static void free_input(orb_context *ctx, merge_input *in) {
     orb_mesh_free(ctx, &in->meshes[s]);
     orb_free(ctx, in->corners[s]);
     orb_free(ctx, in->points[s]);
+    orb_mesh_free(ctx, &in->files[s].mesh);
+    orb_free(ctx, in->files[s].bytes);
   }
-  orb_mesh_free(ctx, &in->file.mesh);
-  orb_free(ctx, in->file.bytes);
   orb_free(ctx, in->landmarks);
   orb_free(ctx, in->places);
   orb_free(ctx, in->noted);
@@ -42,8 +43,9 @@ static void free_input(orb_context *ctx, merge_input *in) {
 static int read_request(const run_job *j, api_supermesh_request *request, api_problem *problem) {
   api_json_error error;
   cJSON *body = api_json_parse(j->request, strlen(j->request), &error);
-  int fine = body ? api_supermesh_request_read(body, request, problem)
-                  : api_refuse(problem, "corrupt", "The stored request of the job does not decode.");
+  int fine =
+      body ? api_supermesh_request_read(body, request, problem)
+           : api_refuse(problem, "corrupt", "The stored request of the job cannot be read: send the request again.");
   cJSON_Delete(body);
   return fine;
 }
@@ -74,6 +76,15 @@ static int place_all(orb_context *ctx, merge_input *in, int32_t s, api_problem *
   return fine;
 }
 
+/* What to load of the file of a shape besides its repaired mesh; NULL: nothing. */
+static run_file *wanted_file(merge_input *in, int32_t s) {
+  int wanted = in->files[s].wants_mesh = s == 0 && in->request.merge.remesh.method == ORB_REMESH_TEMPLATE;
+  for (int32_t i = 0; i < in->request.carry_count; i++) {
+    wanted |= in->request.carries[i].from == s;
+  }
+  return wanted ? &in->files[s] : NULL;
+}
+
 static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int32_t s, api_problem *problem) {
   const api_landmark_list *list = &in->request.landmarks;
   api_embedding_request wanted = {.options = in->request.embedding};
@@ -90,13 +101,16 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
     const api_place *spot = &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s];
     noted[l].index = spot->kind == API_PLACE_TRIANGLE ? spot->index : -1;
   }
-  run_file *file = s == 0 && in->request.merge.remesh.method == ORB_REMESH_TEMPLATE ? &in->file : NULL;
+  run_file *file = wanted_file(in, s);
   int fine = run_load_mesh(env, ctx, wanted.mesh, &in->meshes[s], noted, list->count, &in->corners[s], file, problem);
-  if (file) {
+  if (file && file->wants_mesh) {
     in->request.merge.file = &file->mesh;
     in->request.merge.file_bytes = file->bytes;
     in->request.merge.file_size = file->size;
     api_supermesh_request_parts(&in->request, in->nodes, &in->request.merge.file_parts);
+  }
+  if (file) {
+    in->shape_files[s] = (orb_shape_file){in->corners[s], file->bytes, file->size};
   }
   for (int32_t l = 0; fine && l < list->count; l++) {
     in->noted[(size_t)l * (size_t)list->shape_count + (size_t)s] = noted[l];
@@ -122,6 +136,9 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, api
     return 0;
   }
   memset(in->landmarks, 0, (size_t)list->count * sizeof *in->landmarks);
+  in->request.merge.carries = in->request.carries;
+  in->request.merge.carry_count = in->request.carry_count;
+  in->request.merge.files = in->shape_files;
   for (int32_t s = 0; s < in->request.shape_count; s++) {
     in->names[s] = in->request.shapes[s].name;
     progress_report(env->progress, "read", (double)s / (double)in->request.shape_count);
@@ -174,7 +191,7 @@ static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_r
  * triangle. */
 static void write_spot(const merge_input *in, size_t shape, const orb_place *place, api_place *out) {
   orb_place file;
-  places_to_file(&in->meshes[shape], in->corners[shape], place, &file);
+  orb_place_in_file(&in->meshes[shape], in->corners[shape], place, &file);
   out->kind = file.triangle >= 0 ? API_PLACE_TRIANGLE : API_PLACE_POINT;
   out->index = file.triangle;
   memcpy(out->at, file.at, sizeof file.at);

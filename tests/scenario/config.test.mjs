@@ -26,6 +26,7 @@ test('values that no daemon can use are refused by name', () => {
     'tls-key': ['/nowhere/key.pem'],
     limits: ['some'],
     auth: ['maybe'],
+    role: ['both', 'serve', 'work'], // the last two only among nodes that share a catalogue
     'socket-mode': ['0999', '1777', 'rw'],
   }))
     for (const value of values) {
@@ -42,6 +43,7 @@ test('values that no daemon can use are refused by name', () => {
     ['--listen', '[::1]:0'],
     ['--listen', ':8080'],
     ['--listen', 'unix:/tmp/x'],
+    ['--role', 'work', '--catalogue', 'postgresql:///x', '--objects', 's3://bucket'],
     ['--cors', '*'],
     ['--cors', 'https://a.example,http://localhost:5173, null'],
     ['--cors', ''],

@@ -1,13 +1,14 @@
 // The files of deploy/, checked by the tools that read them: systemd scores the unit, Prometheus checks the metrics.
 import assert from 'node:assert/strict';
-import { spawnSync } from 'node:child_process';
+import { spawn, spawnSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { readFile, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
+import parsers from '@stoplight/spectral-parsers';
 import { folder } from './support/cli.mjs';
-import { binaries, daemon, root, slow } from './support/daemon.mjs';
+import { binaries, daemon, root, slow, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const lacks = (program) => spawnSync(program, ['--version']).error !== undefined && `${program} is not installed`;
@@ -28,6 +29,12 @@ test('the unit is sandboxed', { skip: lacks('systemd-analyze') }, () => {
   assert.match(run('systemd-analyze', ['security', '--offline=true', '--no-pager', open]).text, /level for .*: 1\.2 /);
   assert.doesNotMatch(run('systemd-analyze', ['verify', open]).text, /Unknown|Failed to parse|Invalid|ignoring/i);
   rmSync(path.dirname(open), { recursive: true });
+  const node = path.join(mkdtempSync(path.join(tmpdir(), 'orbmorph-unit-')), 'orbmorphd.service');
+  const [before, after] = readFileSync(path.join(root, 'deploy/cluster/node.conf'), 'utf8').split('[Service]\n');
+  const both = readFileSync(unit, 'utf8').replace(/^\[Service\]$/m, `${before.split('[Unit]\n')[1]}\n$&`);
+  writeFileSync(node, both.replace(/^\[Install\]$/m, `${after}\n$&`));
+  assert.doesNotMatch(run('systemd-analyze', ['verify', node]).text, /Unknown|Failed to parse|Invalid|ignoring/i);
+  rmSync(path.dirname(node), { recursive: true });
   // 20: worse than that would be refused.
   assert.equal(run('systemd-analyze', ['security', '--offline=true', '--no-pager', '--threshold=20', unit]).status, 0);
   const verified = run('systemd-analyze', ['verify', unit, path.join(root, 'deploy/orbmorphd.socket')]).text;
@@ -161,4 +168,101 @@ test('Prometheus takes the metrics, and the queries of the dashboard', { skip: l
   const rules = run('promtool', ['check', 'rules', file]);
   assert.equal(rules.status, 0, rules.text);
   assert.match(rules.text, new RegExp(`${queries.length} rules`));
+});
+
+const cluster = (name) => readFileSync(path.join(root, 'deploy/cluster', name), 'utf8');
+/** The documents of a YAML file, which must be valid. */
+function yaml(name) {
+  const documents = cluster(name).split(/^---$/m);
+  return documents.map((text) => {
+    const { data, diagnostics } = parsers.Yaml.parse(text);
+    assert.deepEqual(diagnostics, [], name);
+    assert.equal(typeof data, 'object', name);
+    return data;
+  });
+}
+/** All values in a document, with their keys. */
+function* walk(value, key = '') {
+  yield [key, value];
+  if (value && typeof value === 'object') for (const [name, inner] of Object.entries(value)) yield* walk(inner, name);
+}
+
+test('the files for a cluster are valid and name options that the daemon has', () => {
+  const help = run(binaries.daemon, ['--help']).text;
+  const known = new Set([...help.matchAll(/^ {2}--([a-z0-9-]+) /gm)].map(([, name]) => name));
+  const [compose] = yaml('compose.yaml');
+  const manifests = yaml('kubernetes.yaml');
+  const named = new Map();
+  for (const [key, value] of [compose, ...manifests].flatMap((document) => [...walk(document)])) {
+    if (key.startsWith('ORBMORPH_')) named.set(key.slice(9).toLowerCase().replaceAll('_', '-'), key);
+    if (['command', 'args'].includes(key) && Array.isArray(value) && String(value[0]).startsWith('--'))
+      for (const word of value) if (String(word).startsWith('--')) named.set(word.slice(2), word);
+  }
+  for (const name of ['serve.conf', 'work.conf'])
+    for (const [, option] of cluster(name).matchAll(/^([a-z0-9-]+) = \S/gm)) named.set(option, name);
+  for (const option of ['role', 'listen', 'catalogue', 'objects', 'cache-bytes', 'drain-seconds', 'lease-seconds'])
+    assert.ok(named.has(option), option);
+  for (const [option, where] of named) assert.ok(known.has(option), `${where}: ${option}`);
+
+  // Both deployments, their budgets, and an autoscaler for the one that works.
+  const all = manifests.map(({ kind, metadata }) => `${kind} ${metadata.name}`);
+  for (const one of ['Deployment serve', 'Deployment work', 'Service orbmorph', 'HorizontalPodAutoscaler work'])
+    assert.ok(all.includes(one), one);
+  assert.equal(all.filter((one) => one.startsWith('PodDisruptionBudget')).length, 2);
+  const spec = (name) => manifests.find(({ kind, metadata }) => kind === 'Deployment' && metadata.name === name).spec;
+  for (const name of ['serve', 'work']) {
+    const { selector, template } = spec(name);
+    assert.deepEqual(selector.matchLabels, template.metadata.labels);
+    const [container] = template.spec.containers;
+    for (const { name: volume } of container.volumeMounts)
+      assert.ok(template.spec.volumes.some((one) => one.name === volume));
+    const drains = Number(container.args[container.args.indexOf('--drain-seconds') + 1] || 8);
+    assert.ok(
+      !container.args.includes('--drain-seconds') || template.spec.terminationGracePeriodSeconds > drains,
+      name,
+    );
+  }
+  assert.equal(spec('serve').template.spec.containers[0].readinessProbe.httpGet.path, '/readyz');
+  assert.equal(spec('work').template.spec.containers[0].ports, undefined, 'a worker needs no port');
+  for (const variable of cluster('compose.yaml').matchAll(/\$\{([A-Z0-9_]+):\?/g))
+    assert.match(cluster('example.env'), new RegExp(`^${variable[1]}=`, 'm'));
+});
+
+test('haproxy takes its configuration, and hides what strangers should not see', {
+  skip: lacks('haproxy'),
+}, async (t) => {
+  const file = path.join(root, 'deploy/cluster/haproxy.cfg');
+  const checked = run('haproxy', ['-c', '-f', file]);
+  assert.equal(checked.status, 0, checked.text);
+  assert.doesNotMatch(checked.text, /WARNING/);
+
+  const d = await daemon(t);
+  const socket = path.join(await folder(t), 'clients.sock');
+  const text = cluster('haproxy.cfg')
+    .replace(/^ {4}maxconn 16384$/m, '    maxconn 64') // each takes descriptors, of which a test may have few
+    .replace(/^ {4}bind :8080$/m, `    bind unix@${socket}`)
+    .replace(/^ {4}server-template .*$/m, `    server one ${new URL(d.url).host}`);
+  const own = path.join(path.dirname(socket), 'haproxy.cfg');
+  await writeFile(own, text);
+  const proxy = spawn('haproxy', ['-db', '-f', own], { stdio: 'ignore' });
+  t.after(() => proxy.kill());
+  const ask = (target, ...more) =>
+    run('curl', [
+      '-sS',
+      '-o',
+      path.join(path.dirname(socket), 'answer'),
+      '-w',
+      '%{http_code}',
+      '--unix-socket',
+      socket,
+      ...more,
+      `http://localhost${target}`,
+    ]).text;
+  await until(() => ask('/livez') === '200', 'haproxy passes requests on', 30);
+  assert.equal(ask('/v1/meshes'), '200');
+  assert.equal(ask('/readyz'), '200');
+  for (const hidden of ['/metrics', '/readyz?verbose', '/readyz?x=1']) assert.equal(ask(hidden), '404', hidden);
+  assert.equal(ask('/v1/meshes?name=tetrahedron', '--data-binary', shapes.tetrahedron), '201');
+  await d.stop();
+  assert.equal(ask('/v1/meshes'), '503');
 });

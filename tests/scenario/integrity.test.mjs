@@ -112,3 +112,20 @@ test('the daemon does not start on a damaged catalogue, and says what to do', as
   writeFileSync(file, whole);
   await d.start();
 });
+
+test('the daemon does not start on a catalogue of a newer program', async (t) => {
+  const d = await daemon(t);
+  await d.stop();
+  const file = path.join(d.data, 'catalogue.sqlite');
+  const bytes = readFileSync(file);
+  const own = bytes.readUInt32BE(60); // user_version, at this place of a file of SQLite
+  assert.ok(own > 0 && own < 999);
+  bytes.writeUInt32BE(999, 60);
+  writeFileSync(file, bytes);
+  await assert.rejects(d.start(), /the daemon did not start: exit 78/);
+  assert.match(d.log, /schema 999.*install a newer version/);
+  assert.equal(readFileSync(file).readUInt32BE(60), 999);
+  bytes.writeUInt32BE(own, 60);
+  writeFileSync(file, bytes);
+  await d.start();
+});

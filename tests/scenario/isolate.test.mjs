@@ -19,7 +19,9 @@ const wobble = (n, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 *
 const status = (pid, name) =>
   new RegExp(`^${name}:\\s+(\\d+)`, 'm').exec(readFileSync(`/proc/${pid}/status`, 'latin1'))?.[1];
 
-const one = (d) => until(() => workers(d).length === 1 && workers(d)[0], 'one process that works', 60);
+/** The processes of jobs alone: one that has read files stays for a while, for more files of its tenant. */
+const only = (d, count) => until(() => workers(d).length === count && workers(d), `${count} processes that work`, 60);
+const one = async (d) => (await only(d, 1))[0];
 const running = (d, job) => until(async () => (await d.get(job.url)).json.stage === 'embed', 'the job runs', 120);
 
 async function slowJob(d, n) {
@@ -55,9 +57,10 @@ test('a process that dies takes its own job, and after three deaths that job is 
   const d = await daemon(t, { args: ['--workers', '2'] });
   const bad = await slowJob(d, 1);
   await running(d, bad.job);
-  const [poison] = workers(d);
+  const poison = await one(d);
   const other = await slowJob(d, 2);
   await running(d, other.job);
+  await only(d, 2);
   const signals = ['SIGSEGV', 'SIGBUS', 'SIGABRT'];
   let pid = poison;
   for (let death = 1; death <= 3; death++) {
@@ -200,6 +203,77 @@ test('a check that hangs delays nobody, and ends with its client, at check-secon
   await third.reply;
   assert.equal((await d.exited).code, 0, d.log);
   assert.ok(Date.now() - asked < 5000 * patience, `it took ${Date.now() - asked} ms to stop`);
+});
+
+/** Whether the process was told; false: it has ended. */
+function told(pid, signal) {
+  try {
+    return process.kill(pid, signal);
+  } catch (error) {
+    assert.equal(error.code, 'ESRCH');
+    return false;
+  }
+}
+
+test('one process reads small files of one tenant, and none of another', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on', '--workers', '2', '--job-memory', '1G'] });
+  const command = async (...args) => (await run(binaries.daemon, [...args, '--data', d.data])).stdout;
+  const tenants = [];
+  for (const name of ['one', 'two']) {
+    const token = (await command('token', 'add', name, '--scope', 'read,write')).trim();
+    tenants.push({ headers: { authorization: `Bearer ${token}` } });
+  }
+  let number = 0;
+  const upload = async (as) => {
+    const reply = await d.post('/v1/meshes', Buffer.from(shapes.binaryPly(wobble(++number, 2))), as);
+    assert.equal(reply.status, 201, reply.bytes.toString());
+    return reply;
+  };
+  /** Uploads until the process that reads files of this tenant alone is still there. */
+  const reader = async (as) => {
+    for (;;) {
+      await upload(as);
+      const [pid, more] = workers(d);
+      if (pid && !more) return pid;
+      await until(() => workers(d).length === 0, 'idle processes end', 20);
+    }
+  };
+  await until(
+    async () => {
+      const first = await reader(tenants[0]);
+      await upload(tenants[0]);
+      return workers(d).length === 1 && workers(d)[0] === first;
+    },
+    'a process reads a second file',
+    60,
+  );
+  await until(
+    async () => {
+      const first = await reader(tenants[0]);
+      await upload(tenants[1]);
+      return workers(d).length === 2 && workers(d).includes(first);
+    },
+    'the other tenant has a process of its own',
+    60,
+  );
+  await until(() => workers(d).length === 0, 'idle processes end', 20);
+
+  // It dies with the second file, perhaps because of the first: the second is read again, and nobody is blamed.
+  await until(
+    async () => {
+      const pid = await reader(tenants[0]);
+      if (!told(pid, 'SIGSTOP')) return false;
+      const reply = upload(tenants[0]);
+      await sleep(50);
+      told(pid, 'SIGABRT'); // sanitizers turn others into an exit
+      told(pid, 'SIGCONT');
+      await reply;
+      return /a process that checked several meshes.* was killed by signal 6/.test(d.log);
+    },
+    'a process dies with its second file',
+    60,
+  );
+  assert.equal(await command('crash', 'list'), '');
 });
 
 for (const what of ['landlock', 'seccomp'])

@@ -8,7 +8,9 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { list, s3 } from '../tools/s3.mjs';
+import { runProgram } from './support/cli.mjs';
 import { assertProblem, Daemon, daemon, samples, until } from './support/daemon.mjs';
+import { busy, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
 import { tetrahedron } from './support/shapes.mjs';
 
 const server = process.env.ORB_S3;
@@ -42,6 +44,14 @@ async function stored(t, prefix, ...args) {
   const d = await daemon(t, { args: ['--objects', at(`objects/${prefix}`), ...args] });
   const empty = () => rm(path.join(d.data, 'cache'), { recursive: true }).then(() => mkdir(path.join(d.data, 'cache')));
   return { d, empty };
+}
+
+/** The same behind a proxy that answers as `decide` says. */
+async function troubled(t, prefix, decide) {
+  const proxy = await s3Proxy(t, server, decide);
+  const d = await daemon(t, { args: ['--objects', `s3://objects/${prefix}?endpoint=${proxy.url}&part_mib=5`] });
+  const empty = () => rm(path.join(d.data, 'cache'), { recursive: true }).then(() => mkdir(path.join(d.data, 'cache')));
+  return { d, empty, proxy };
 }
 
 const keyOf = async (prefix, kind, id) => {
@@ -146,6 +156,21 @@ test('a damaged object in the bucket is found, and made again', async (t) => {
   await until(async () => (await d.get(`/v1/embeddings/${embedding.id}`)).status === 404, 'the row is deleted');
 });
 
+test('an object without its hash is not served, and stays: something else may answer in the place of S3', async (t) => {
+  const { d, empty } = await stored(t, 'bare');
+  const { id } = (await d.upload(tetrahedron)).json;
+  const key = await keyOf('bare', 'mesh', id);
+  const whole = await (await s3(server, 'GET', `objects/${key}`)).text();
+  assert.ok((await s3(server, 'PUT', `objects/${key}`, '<html>Come back later</html>')).ok);
+  await empty();
+  assertProblem(await d.get(`/v1/meshes/${id}/file`), 500, 'internal');
+  assert.match(d.log, /without its hash/);
+  assert.equal(await keyOf('bare', 'mesh', id), key);
+  const meta = { sha256: (await import('node:crypto')).createHash('sha256').update(whole).digest('hex') };
+  assert.ok((await s3(server, 'PUT', `objects/${key}`, whole, meta)).ok);
+  assert.equal((await d.get(`/v1/meshes/${id}/file`)).bytes.toString(), whole);
+});
+
 test('while S3 is away, requests get 503, the cache is served and jobs wait', async (t) => {
   const { d, empty } = await stored(t, 'away');
   const dog = await d.mesh(path.join(samples, 'dog.obj'));
@@ -209,4 +234,89 @@ test('the cache stays within its bound', async (t) => {
   }
   assert.ok(bytes > 300_000 && bytes <= most, `${bytes}`);
   assert.equal((await list(server, 'objects', 'bound/mesh/')).length, 8);
+});
+
+test('each request that fails is tried again: 503, lost answers, half a body, wrong bytes', async (t) => {
+  // Each request fails three times in a row, each time in another way.
+  const ways = { GET: [half, busy, late], PUT: [busy, lost, late], HEAD: [lost, busy, late], DELETE: [lost] };
+  const { d, empty, proxy } = await troubled(t, 'troubled', ({ method, path, tries }) =>
+    path.endsWith('orbmorph-owner') ? undefined : ways[method]?.[tries - 1],
+  );
+  const dog = await d.mesh(path.join(samples, 'dog.obj'));
+  const embedding = await d.made('/v1/embeddings', { mesh: dog.id });
+  const sphere = `/v1/embeddings/${embedding.id}/sphere.ply`;
+  const { bytes } = await d.get(sphere);
+  await empty();
+  assert.ok((await d.get(sphere)).bytes.equals(bytes));
+  assert.equal((await d.delete(`/v1/embeddings/${embedding.id}`)).status, 204);
+  assert.equal(await keyOf('troubled', 'sphere', embedding.id), undefined);
+  for (const way of [busy, lost, half])
+    assert.ok(
+      proxy.seen.some(({ how }) => how === way),
+      way,
+    );
+  assert.doesNotMatch(d.log, /S3 is away/);
+
+  // Bytes that are wrong on the way only: read again, and the object stays.
+  for (const way of [short, flipped]) {
+    const name = way === short ? 'one' : 'two';
+    const { id } = (await d.upload(Buffer.from(`${tetrahedron}# ${name}\n`))).json;
+    await empty();
+    let wrong = 0;
+    proxy.decide = ({ method }) => (method === 'GET' && wrong++ < 2 ? way : undefined);
+    assert.equal((await d.get(`/v1/meshes/${id}/file`)).bytes.toString(), `${tetrahedron}# ${name}\n`);
+    assert.ok(wrong >= 3);
+    assert.ok(await keyOf('troubled', 'mesh', id));
+  }
+  assert.ok(!existsSync(path.join(d.data, 'quarantine')));
+});
+
+test('a large object goes in parts, each tried again, and is put together once', async (t) => {
+  const part = 5 << 20;
+  const { d, empty, proxy } = await troubled(t, 'large', ({ method, query, tries }) => {
+    if (/partNumber=2/.test(query)) return tries === 1 ? busy : tries === 2 ? lost : undefined;
+    return method === 'POST' && /^uploadId=/.test(query) && tries === 1 ? late : undefined; // it has put it together
+  });
+  const body = Buffer.concat([Buffer.alloc(part + 1000, '# padding\n'), Buffer.from(`\n${tetrahedron}`)]);
+  const reply = await d.upload(body);
+  assert.equal(reply.status, 201, reply.bytes.toString());
+  const parts = proxy.seen.filter(({ method, query }) => method === 'PUT' && /partNumber=/.test(query));
+  assert.deepEqual(
+    parts.map(({ query, how }) => [/partNumber=(\d)/.exec(query)[1], how]),
+    [
+      ['1', 'pass'],
+      ['2', busy],
+      ['2', lost],
+      ['2', 'pass'],
+    ],
+  );
+  await empty();
+  assert.ok((await d.get(`/v1/meshes/${reply.json.id}/file`)).bytes.equals(body));
+  assert.doesNotMatch(d.log, /S3 is away/);
+
+  // S3 that stays in trouble: the upload is refused, nothing of it stays, and it works later.
+  proxy.decide = ({ query }) => (/partNumber=2/.test(query) ? busy : undefined);
+  const other = Buffer.concat([body, Buffer.from('# other\n')]);
+  assertProblem(await d.upload(other), 503, 'unavailable');
+  proxy.decide = () => undefined;
+  await until(async () => (await d.get('/readyz')).status === 200, 'S3 is back', 60);
+  assert.equal((await list(server, 'objects', 'large/mesh/')).length, 1);
+  assert.equal((await d.upload(other)).status, 201);
+  assert.equal((await list(server, 'objects', 'large/mesh/')).length, 2);
+});
+
+test('S3 that does not answer at the start is no wrong configuration: systemd starts the daemon again', async (t) => {
+  const data = await folder(t);
+  const proxy = await s3Proxy(t, server, () => busy);
+  for (const [endpoint, why] of [
+    ['http://127.0.0.1:1', /S3 at 127\.0\.0\.1:1 does not answer: .*[Cc]onnect/],
+    [proxy.url, /S3 at 127\.0\.0\.1:\d+ does not answer: it answered 503 SlowDown/],
+  ]) {
+    const args = ['--listen', '127.0.0.1:0', '--data', data, '--objects', `s3://objects/start?endpoint=${endpoint}`];
+    const { code, out, err } = await runProgram(program, [...args, '--log-format', 'text']);
+    assert.equal(code, 1, err);
+    assert.match(err, why);
+    assert.equal(out, '');
+    assert.ok(!existsSync(path.join(data, 'catalogue.sqlite')));
+  }
 });

@@ -1,8 +1,9 @@
 // The remesh method "template": the first shape's own vertices and triangles carry the morph.
 import assert from 'node:assert/strict';
-import { readFile } from 'node:fs/promises';
+import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
+import { folder, run } from './support/cli.mjs';
 import { daemon, samples } from './support/daemon.mjs';
 import { farthest, toTriangle } from './support/distance.mjs';
 import { morphOf, parseGlb } from './support/glb.mjs';
@@ -182,4 +183,80 @@ test('an OBJ vertex with several texture coordinates gets copies after all verti
     const [a, b] = uv[v + chartOf(Math.floor(i / 3))];
     assert.deepEqual([read[2 * at], read[2 * at + 1]], [a, Math.fround(1 - b)]);
   });
+});
+
+test('where the template is too coarse for a shape, its triangles are named, the farthest first', async (t) => {
+  const d = await daemon(t);
+  const plain = shapes.ball(3);
+  const horned = shapes.ball(4, (p) => {
+    const r = 1 + 0.5 * Math.exp(-(((p[0] - 1) ** 2 + p[1] ** 2 + p[2] ** 2) / 0.02));
+    return p.map((x) => r * x);
+  });
+  const ids = [];
+  for (const body of [plain, horned]) ids.push({ mesh: (await d.upload(shapes.obj(body))).json.id });
+  const request = (tolerance, method = 'template') => ({
+    shapes: ids,
+    align: { method: 'rotate' },
+    remesh: { method, tolerance },
+    asset: { fit: 'none' },
+  });
+  const tolerance = 0.006;
+  const { shapes: told, asset } = await d.made('/v1/supermeshes', request(tolerance));
+  assert.equal(told[0].coarse, undefined);
+  const { diagonal, coarse } = told[1];
+  // The same by all pairs of samples and triangles.
+  const made = pointsOf(morphOf((await d.get(asset)).bytes), 1);
+  const faces = plain.triangles.map((corners) => corners.map((v) => made[v]));
+  const mean = (points) => [0, 1, 2].map((k) => points.reduce((sum, p) => sum + p[k] / points.length, 0));
+  const nearest = (p, among) => {
+    let [least, at] = [Infinity, -1];
+    among.forEach((face, i) => {
+      const distance = toTriangle(p, ...face);
+      if (distance < least) [least, at] = [distance, i];
+    });
+    return [least, at];
+  };
+  const wanted = facesOf(horned);
+  const errors = faces.map(([a, b, c]) =>
+    Math.max(
+      ...[
+        [a, b],
+        [b, c],
+        [c, a],
+        [a, b, c],
+      ].map((points) => nearest(mean(points), wanted)[0]),
+    ),
+  );
+  for (const p of [...horned.positions, ...wanted.map(mean)]) {
+    const [distance, i] = nearest(p, faces);
+    errors[i] = Math.max(errors[i], distance);
+  }
+  const limit = tolerance * diagonal;
+  const expected = errors.filter((x) => x > limit).sort((a, b) => b - a);
+  assert.ok(expected.length > 0 && expected.length < 20, `only the horn is missed: ${expected.length}`);
+  assert.equal(coarse.count, expected.length);
+  assert.equal(coarse.triangles.length, coarse.count);
+  coarse.errors_relative.forEach((x, i) => assert.ok(Math.abs(x * diagonal - expected[i]) < 1e-5, `error ${i}`));
+  // Samples at an edge may count for either triangle there, so the named ones are compared as far as they are clear.
+  assert.equal(coarse.triangles[0], errors.indexOf(Math.max(...errors)));
+  for (const i of coarse.triangles) assert.ok(errors[i] > limit, `triangle ${i}`);
+  const areaOf = (face) => Math.hypot(...normalOf(face));
+  const sum = (list) => list.reduce((total, face) => total + areaOf(face), 0);
+  const share = sum(coarse.triangles.map((i) => faces[i])) / sum(faces);
+  assert.ok(Math.abs(coarse.share - share) < 1e-5, `${coarse.share}, measured ${share}`);
+  const at = await folder(t);
+  const files = ['plain', 'horned'].map((name) => path.join(at, `${name}.obj`));
+  for (const [i, body] of [plain, horned].entries()) await writeFile(files[i], shapes.obj(body));
+  const options = ['--remesh', 'template', '--align', 'rotate', '--fit', 'none', '-t', String(tolerance)];
+  const args = ['morph', ...files, ...options, '-o', path.join(at, 'out.glb')];
+  const { code, out, err } = await run(args, { env: { ORBMORPH_SERVER: d.url } });
+  assert.equal(code, 0, err);
+  const [, count, first] = out.match(
+    /The mesh of plain is too coarse for horned at (\d+) of its triangles \(.* %\s+of the\s+surface\); subdivide it around triangle (\d+)/,
+  );
+  assert.deepEqual([Number(count), Number(first)], [coarse.count, coarse.triangles[0]]);
+  for (const fine of [request(0.2), request(tolerance, 'adaptive')]) {
+    const { shapes: list } = await d.made('/v1/supermeshes', fine);
+    assert.ok(list.every((shape) => !('coarse' in shape)));
+  }
 });

@@ -17,7 +17,7 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress']
+      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress', 'others']
         .map((name) => `export * from './${name}.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
@@ -533,4 +533,57 @@ test('a kept document: the new targets, in the scene, after those that it had', 
     'a mirror turns the triangles',
   );
   close(normal, [0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1]);
+});
+
+test('another match: it flips if limbs change sides, and neither stay nor trade with head or tail', () => {
+  const names = ['head', 'tail', 'left front limb', 'right front limb', 'left hind limb', 'right hind limb', 'auto 7'];
+  const found = names.map((_, i) => [
+    [10 * i, 0, 0],
+    [10 * i, 5, 0],
+  ]);
+  const sides = names.map(mesh.sideOf);
+  assert.deepEqual(sides, [0, 0, -1, 1, -1, 1, NaN]);
+  /** The match that takes each of these landmarks of the first shape to that of the second. */
+  const match = (pairs) => {
+    const places = pairs.map(([a, b]) => [found[a][0], found[b][1]]);
+    const { flips, swaps } = mesh.otherOf(found, places, sides, [30, 30]);
+    return { flips, swaps: swaps.map(({ from, to }) => [from, to]) };
+  };
+  const twin = [
+    [2, 3],
+    [3, 2],
+    [4, 5],
+    [5, 4],
+  ];
+  assert.deepEqual(match([[0, 0], [1, 1], ...twin]), { flips: true, swaps: twin });
+  assert.equal(match([...twin, [6, 2]]).flips, true, 'a landmark whose side is unknown says nothing');
+  assert.equal(
+    match([
+      [2, 3],
+      [3, 2],
+      [0, 4],
+    ]).flips,
+    false,
+    'the head goes to a limb',
+  );
+  assert.equal(
+    match([
+      [2, 3],
+      [3, 2],
+      [4, 4],
+    ]).flips,
+    false,
+    'a hind limb keeps its side',
+  );
+  assert.equal(match([[2, 3]]).flips, false, 'one limb is a mistake at one pair');
+  assert.equal(
+    match([
+      [2, 4],
+      [3, 5],
+      [4, 2],
+      [5, 3],
+    ]).flips,
+    false,
+    'front to back',
+  );
 });

@@ -4,6 +4,7 @@
 # The command finds in its environment
 #   ORB_POSTGRESQL     the URL of the server's database
 #   ORB_NEW_CATALOGUE  a program: prints the URL of the catalogue for a data folder, and creates its empty schema
+#   ORB_POSTGRESQL_DO  a program: stops or starts the server (stop, start)
 #   ORBMORPHD          if it is set: a program that starts that daemon with the catalogue of its --data
 #   ORB_DAEMON         then: that daemon itself
 set -eu
@@ -30,9 +31,15 @@ cd "$folder"
   { cat "$folder/log" >&2; exit 1; }
 # Connections of the role "guarded" need a password.
 sed -i '1i local all guarded scram-sha-256' "$folder/data/pg_hba.conf"
-"${as[@]}" env HOME="$folder" "$bin/pg_ctl" -D "$folder/data" -s -w -l "$folder/server.log" \
-  -o "-c listen_addresses='' -c unix_socket_directories='$folder' -c fsync=off -c max_connections=300 -c shared_buffers=32MB" \
-  start || { cat "$folder/server.log" >&2; exit 1; }
+export ORB_POSTGRESQL_DO="$folder/do"
+cat >"$ORB_POSTGRESQL_DO" <<END
+#!/bin/sh
+cd "$folder"
+exec ${as[*]} env HOME="$folder" "$bin/pg_ctl" -D "$folder/data" -s -w -m fast -l "$folder/server.log" \
+  -o "-c listen_addresses='' -c unix_socket_directories='$folder' -c fsync=off -c max_connections=300 -c shared_buffers=32MB" "\$1"
+END
+chmod 755 "$ORB_POSTGRESQL_DO"
+"$ORB_POSTGRESQL_DO" start || { cat "$folder/server.log" >&2; exit 1; }
 export ORB_POSTGRESQL="postgresql:///postgres?host=$folder&user=orbmorph"
 export ORB_NEW_CATALOGUE="$folder/new_catalogue"
 chmod 755 "$folder"

@@ -110,13 +110,14 @@ static double mean_error(orb_context *ctx, const body bodies[2], const orb_align
   return sum / (TRUE_PLACES - GIVEN) / extent.diagonal;
 }
 
-/* The landmarks are exact and at their true places, and the shapes are one person: the map is near an isometry. Pinned
- * on their spheres, the map stayed caught at an energy of 2 and a mean error of 0.013. */
+/* The landmarks are exact and at their true places, and the shapes are two people who sit: the map is near an isometry.
+ * Pinned on their spheres, the map stayed caught at an energy of 3.5; and at 1.5 where all landmarks were moved to
+ * their partners at once. */
 static void many_true_landmarks_do_not_spoil_a_pose(void **state) {
   (void)state;
   body bodies[2];
-  orb_context *ctx = load_or_skip((const char *const[2]){"ada-neutral.obj", "ada-run.off"},
-                                  (const char *const[2]){"ada-neutral.truth.csv", "ada-run.truth.csv"}, bodies);
+  orb_context *ctx = load_or_skip((const char *const[2]){"cora-sit.obj", "ada-sit.obj"},
+                                  (const char *const[2]){"cora-sit.truth.csv", "ada-sit.truth.csv"}, bodies);
   orb_place at[GIVEN][2];
   orb_landmark landmarks[GIVEN];
   memset(landmarks, 0, sizeof landmarks);
@@ -132,8 +133,8 @@ static void many_true_landmarks_do_not_spoil_a_pose(void **state) {
   orb_align_defaults(&options);
   options.preset = ORB_PRESET_DEFAULT;
   align_and_check(ctx, shapes, 2, landmarks, GIVEN, &options, &out);
-  assert_true(out.energy <= 1.4);
-  assert_true(mean_error(ctx, bodies, &out) <= 0.01);
+  assert_true(out.energy <= 1.3);
+  assert_true(mean_error(ctx, bodies, &out) <= 0.012);
   orb_alignment_free(ctx, &out);
   unload(ctx, bodies);
 }

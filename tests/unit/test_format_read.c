@@ -386,10 +386,65 @@ static void test_attributes(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
+/* A mesh keeps 65,536 names; the faces of all further objects belong to one without a name, and this is noted. */
+static void test_many_objects(void **state) {
+  (void)state;
+  enum { OBJECTS = 65539, LINE = 24 };
+  char *text = malloc((size_t)LINE * OBJECTS + 64);
+  assert_non_null(text);
+  int n = sprintf(text, "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  for (int i = 0; i < OBJECTS; i++) {
+    n += sprintf(text + n, "o part%d\nf 1 2 3\n", i);
+  }
+  orb_mesh mesh;
+  assert_int_equal(read_bytes(text, (size_t)n, &mesh), ORB_OK);
+  assert_int_equal(mesh.triangle_count, OBJECTS);
+  assert_int_equal(mesh.object_count, 65537);
+  assert_string_equal(mesh.objects[65535].name, "part65535");
+  assert_string_equal(mesh.objects[65536].name, "");
+  assert_int_equal(mesh.objects[65536].first_triangle, 65536);
+  assert_int_equal(mesh.dropped_count, 1);
+  assert_string_equal(mesh.dropped[0].what, "names of objects");
+  orb_mesh_free(ctx, &mesh);
+  free(text);
+}
+
+/* Each refusal names the limit that the file exceeds. */
+static void test_limits(void **state) {
+  (void)state;
+  enum { CORNERS = (1 << 24) + 1 };
+  char *text = malloc(2 * (size_t)CORNERS + 64);
+  assert_non_null(text);
+  int n = sprintf(text, "v 0 0 0\nf");
+  for (int i = 0; i < CORNERS; i++) {
+    memcpy(text + n + 2 * (size_t)i, " 1", 2);
+  }
+  orb_mesh mesh;
+  orb_context *roomy = NULL;
+  const orb_context_options options = {.max_triangles = 1 << 25};
+  assert_int_equal(orb_context_create(&options, &roomy), ORB_OK);
+  assert_int_equal(
+      orb_mesh_read(roomy, (const unsigned char *)text, (size_t)n + 2 * (size_t)CORNERS, ORB_FORMAT_OBJ, &mesh, NULL),
+      ORB_E_TOO_LARGE);
+  assert_non_null(strstr(orb_context_error(roomy)->detail, "A face has 16777217 corners, and at most 16777216"));
+  orb_context_destroy(roomy);
+  free(text);
+
+  orb_context *tight = NULL;
+  const orb_context_options three = {.max_triangles = 3};
+  assert_int_equal(orb_context_create(&three, &tight), ORB_OK);
+  assert_int_equal(
+      orb_mesh_read(tight, (const unsigned char *)TEXTS[0], strlen(TEXTS[0]), ORB_FORMAT_AUTO, &mesh, NULL),
+      ORB_E_TOO_LARGE);
+  assert_non_null(strstr(orb_context_error(tight)->detail, "more than 3 triangles"));
+  orb_context_destroy(tight);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_texts),     cmocka_unit_test(test_binaries),
-                                     cmocka_unit_test(test_errors),    cmocka_unit_test(test_range),
-                                     cmocka_unit_test(test_numbers),   cmocka_unit_test(test_prefixes),
-                                     cmocka_unit_test(test_mutations), cmocka_unit_test(test_attributes)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_texts),        cmocka_unit_test(test_binaries),
+                                     cmocka_unit_test(test_errors),       cmocka_unit_test(test_range),
+                                     cmocka_unit_test(test_numbers),      cmocka_unit_test(test_prefixes),
+                                     cmocka_unit_test(test_mutations),    cmocka_unit_test(test_attributes),
+                                     cmocka_unit_test(test_many_objects), cmocka_unit_test(test_limits)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

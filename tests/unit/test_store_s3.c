@@ -102,6 +102,9 @@ static void test_urls(void **state) {
   assert_string_equal(at.base, "/");
   assert_string_equal(at.prefix, "");
   assert_string_equal(at.scheme, "https");
+  assert_int_equal(at.part_mib, 64);
+  assert_true(s3_url_read("s3://things?part_mib=5", &at, &why));
+  assert_int_equal(at.part_mib, 5);
   assert_true(
       s3_url_read("s3://things/a/b/?region=eu-1&path_style=1&endpoint=https%3A%2F%2Fs3.example.org:443/", &at, &why));
   assert_string_equal(at.host, "s3.example.org");
@@ -128,6 +131,9 @@ static void test_urls(void **state) {
                                       "s3://things?region=",
                                       "s3://things?region=a%00b",
                                       "s3://things?path_style=2",
+                                      "s3://things?part_mib=4",
+                                      "s3://things?part_mib=5121",
+                                      "s3://things?part_mib=5M",
                                       "s3://things?colour=red"};
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
     if (s3_url_read(wrong[i], &at, &why)) {

@@ -320,6 +320,33 @@ static void test_memory_of_files(void **state) {
   budget_destroy(memory);
 }
 
+static void count_call(void *user) {
+  ++*(int *)user;
+}
+
+/* Listeners hear of memory that someone asked for in vain, once for each time, and of no other. */
+static void test_listeners(void **state) {
+  (void)state;
+  int calls = 0;
+  memory_budget *memory = budget_create(200);
+  assert_non_null(memory);
+  budget_listen(memory, count_call, &calls);
+  assert_true(budget_take(memory, BUDGET_CHECKS, 60));
+  const unsigned before = budget_shortages(memory, BUDGET_CHECKS);
+  budget_give(memory, BUDGET_CHECKS, 10, NULL);
+  assert_int_equal(calls, 0);
+  assert_false(budget_has_room(memory, BUDGET_CHECKS, 60));
+  assert_true(budget_shortages(memory, BUDGET_CHECKS) != before);
+  budget_give(memory, BUDGET_CHECKS, 10, NULL);
+  assert_int_equal(calls, 1);
+  budget_give(memory, BUDGET_CHECKS, 10, NULL);
+  assert_int_equal(calls, 1);
+  assert_false(budget_take(memory, BUDGET_SMALL, 51));
+  budget_give(memory, BUDGET_CHECKS, 30, NULL); /* another part */
+  assert_int_equal(calls, 1);
+  budget_destroy(memory);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_time_decides, stored_setup, stored_teardown),
@@ -332,6 +359,7 @@ int main(void) {
       cmocka_unit_test(test_tasks_take_turns),
       cmocka_unit_test(test_tasks_share_memory),
       cmocka_unit_test(test_memory_of_files),
+      cmocka_unit_test(test_listeners),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,8 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
+#include "merge/report.h"
 #include "merge/warn.h"
 #include "support_context.h"
 
@@ -191,9 +193,47 @@ static void test_units(void **state) {
   assert_int_equal(warning.part_count, 0);
 }
 
+/* A band that the map draws 400 times as long consists of needles there, and of no needles where it came from.
+ */
+static void test_needles_of_one_shape(void **state) {
+  (void)state;
+  static orb_place places[2 * VERTICES];
+  orb_aligned_shape shapes[2] = {{.points = position[0]}, {.points = position[0]}};
+  orb_merge_result out = {.supermesh = {.shape_count = 2,
+                                        .vertex_count = VERTICES,
+                                        .triangle_count = TRIANGLES,
+                                        .triangles = triangles,
+                                        .points = position[0],
+                                        .places = places},
+                          .alignment = {.shapes = shapes, .shape_count = 2}};
+  lengthen(400, 0.05, 1, 30);
+  for (int s = 0; s < 2; s++) {
+    shapes[s].mesh = (orb_mesh){
+        .positions = position[s], .triangles = triangles, .vertex_count = VERTICES, .triangle_count = TRIANGLES};
+    for (int32_t i = 0; i < 3 * TRIANGLES; i++) {
+      places[VERTICES * s + triangles[i]] = (orb_place){.triangle = i / 3, .at = {i % 3 == 0, i % 3 == 1, i % 3 == 2}};
+    }
+  }
+  assert_int_equal(orb_report_pairs(ctx, NULL, &out), ORB_OK);
+  int found = 0;
+  for (int32_t i = 0; i < out.warning_count; i++) {
+    if (out.warnings[i].kind == ORB_WARNING_STRETCHED) {
+      found++;
+      assert_true(fabs(out.warnings[i].share - 200 / 209.5) < 1e-9);
+    }
+  }
+  assert_int_equal(found, 1);
+  orb_free(ctx, out.pairs);
+  orb_free(ctx, out.warnings);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_bands),     cmocka_unit_test(test_either_shape),
-                                     cmocka_unit_test(test_collapsed), cmocka_unit_test(test_twist),
-                                     cmocka_unit_test(test_moved),     cmocka_unit_test(test_units)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_bands),
+                                     cmocka_unit_test(test_either_shape),
+                                     cmocka_unit_test(test_collapsed),
+                                     cmocka_unit_test(test_twist),
+                                     cmocka_unit_test(test_moved),
+                                     cmocka_unit_test(test_units),
+                                     cmocka_unit_test(test_needles_of_one_shape)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

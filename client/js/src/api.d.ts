@@ -266,6 +266,14 @@ export type SupermeshRequest = {
     /** Names of nodes: the meshes that they and the nodes below them show. */
     nodes?: string[];
   };
+  /** What the asset gets of the shapes besides their surfaces, by places: the skin with its skeleton; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) where the shape does not have it. `transferred` of the supermesh says what came of it. Such an asset has the profile float only. */
+  transfer?: Array<{
+    /** The shape, from 0 in their order. */
+    from: number;
+    what: 'skin' | 'color' | 'texcoord' | 'targets' | 'texture';
+    /** Of a texture: texels a side. Default: as fine as the textures of the shape, at most 4096. */
+    resolution?: number;
+  }>;
   webhook?: WebhookRequest;
 };
 
@@ -329,6 +337,14 @@ export type CanonicalRequest = {
     /** Names of nodes: the meshes that they and the nodes below them show. */
     nodes: string[];
   };
+  /** Only where the request has it. */
+  transfer?: Array<{
+    /** The shape, from 0 in their order. */
+    from: number;
+    what: 'skin' | 'color' | 'texcoord' | 'targets' | 'texture';
+    /** Of a texture: texels a side. Default: as fine as the textures of the shape, at most 4096. */
+    resolution?: number;
+  }>;
 };
 
 export type ProfileBounds = {
@@ -343,7 +359,7 @@ export type Supermesh = {
   url: string;
   asset: string;
   asset_bytes: number;
-  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh, and where the asset is an uploaded glTF document, which has the profile float only. */
+  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh, and where the asset is an uploaded glTF document or has something by `transfer`: these have the profile float only. */
   profiles?: {
     /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound, to be added to hausdorff_relative. */
     quantization_relative: number | null;
@@ -376,6 +392,17 @@ export type Supermesh = {
     diagonal: number | null;
     /** The area of the smallest triangle divided by the mean area. */
     min_area_ratio: number | null;
+    /** With the method `template`: where the triangles of the first shape are too coarse for this one. At samples of both surfaces they are farther apart than `remesh.tolerance`. Absent if none is. */
+    coarse?: {
+      /** The share of these triangles in the area of the template on this shape. */
+      share: number;
+      /** The number of these triangles. */
+      count: number;
+      /** The farthest of them, the farthest first, as triangles of the first shape's file, counted from 0 after polygons are cut into triangles. Triangles that a repair made are not listed. */
+      triangles: number[];
+      /** The distances of these triangles, relative to the diagonal of this shape. */
+      errors_relative: number[];
+    };
     /** What `asset.fit` did to the shape. Absent if an older engine made the supermesh. */
     fit?: {
       kind: 'none' | 'rigid' | 'similarity';
@@ -512,6 +539,16 @@ export type Supermesh = {
     where: string;
     /** The reason. */
     why: string;
+  }>;
+  /** What `transfer` has given the asset. Only where the request has it. */
+  transferred?: Array<{
+    /** The shape. */
+    from: number;
+    what: 'skin' | 'color' | 'texcoord' | 'targets' | 'texture';
+    /** Its name in the asset: that of an attribute, of a target or of a variant. */
+    as: string;
+    /** Of a texture: texels a side. */
+    resolution?: number;
   }>;
   timings_ms: {
     embed: number;
@@ -842,7 +879,7 @@ export type ProblemExpiredSignature = {
 
 export type ProblemForeignHost = {
   type: '/problems/foreign-host';
-  title: 'The request came under a foreign name';
+  title: 'The request addresses the daemon by a name that is not its own';
   status: 403;
   /** What is wrong and what to do. */
   detail: string;
@@ -852,7 +889,7 @@ export type ProblemForeignHost = {
 
 export type ProblemForeignOrigin = {
   type: '/problems/foreign-origin';
-  title: 'The request came from a foreign page';
+  title: 'A page of another site sent the request';
   status: 403;
   /** What is wrong and what to do. */
   detail: string;
@@ -862,7 +899,7 @@ export type ProblemForeignOrigin = {
 
 export type ProblemForbiddenAddress = {
   type: '/problems/forbidden-address';
-  title: 'The service does not connect to this address';
+  title: 'The daemon may not connect to this address';
   status: 403;
   /** What is wrong and what to do. */
   detail: string;
@@ -872,7 +909,7 @@ export type ProblemForbiddenAddress = {
 
 export type ProblemNotFound = {
   type: '/problems/not-found';
-  title: 'Not found';
+  title: 'Nothing is here';
   status: 404;
   /** What is wrong and what to do. */
   detail: string;
@@ -884,7 +921,7 @@ export type ProblemNotFound = {
 
 export type ProblemMethodNotAllowed = {
   type: '/problems/method-not-allowed';
-  title: 'Method not allowed';
+  title: 'This path does not accept the method';
   status: 405;
   /** What is wrong and what to do. */
   detail: string;
@@ -972,7 +1009,7 @@ export type ProblemUnsupportedEncoding = {
 
 export type ProblemPreconditionFailed = {
   type: '/problems/precondition-failed';
-  title: 'A precondition failed';
+  title: 'The resource differs from what the request expects';
   status: 412;
   /** What is wrong and what to do. */
   detail: string;
@@ -1071,7 +1108,7 @@ export type ProblemNotGenusZero = {
 
 export type ProblemDegenerate = {
   type: '/problems/degenerate';
-  title: 'The mesh is degenerate';
+  title: 'The mesh has too few triangles or is too small';
   status: 422;
   /** What is wrong and what to do. */
   detail: string;
@@ -1121,7 +1158,7 @@ export type ProblemBadOption = {
 
 export type ProblemUnknownMember = {
   type: '/problems/unknown-member';
-  title: 'A member is unknown';
+  title: 'A member of the request is unknown';
   status: 422;
   /** What is wrong and what to do. */
   detail: string;
@@ -1131,7 +1168,7 @@ export type ProblemUnknownMember = {
 
 export type ProblemInvalidRequest = {
   type: '/problems/invalid-request';
-  title: 'The request is not valid';
+  title: 'A member of the request is not valid';
   status: 422;
   /** What is wrong and what to do. */
   detail: string;
@@ -1153,7 +1190,7 @@ export type ProblemUnsupportedMethod = {
 
 export type ProblemTooManyRequests = {
   type: '/problems/too-many-requests';
-  title: 'Too many requests';
+  title: 'Too many requests came at once';
   status: 429;
   /** What is wrong and what to do. */
   detail: string;
@@ -1161,7 +1198,7 @@ export type ProblemTooManyRequests = {
 
 export type ProblemQuotaExceeded = {
   type: '/problems/quota-exceeded';
-  title: 'The quota is exhausted';
+  title: 'The quota is used up';
   status: 429;
   /** What is wrong and what to do. */
   detail: string;
@@ -1195,7 +1232,7 @@ export type ProblemFetchFailed = {
 
 export type ProblemInternal = {
   type: '/problems/internal';
-  title: 'Internal server error';
+  title: 'The daemon failed at this';
   status: 500;
   /** What is wrong and what to do. */
   detail: string;
@@ -1230,7 +1267,7 @@ export type ProblemCorrupt = {
 /** For jobs. */
 export type ProblemCrashed = {
   type: '/problems/crashed';
-  title: 'The job crashed the server repeatedly';
+  title: 'The job crashed the daemon repeatedly';
   status: 500;
   /** What is wrong and what to do. */
   detail: string;
@@ -1239,7 +1276,7 @@ export type ProblemCrashed = {
 /** For jobs, for requests whose processes have died three times, and for the check of an upload. */
 export type ProblemJobCrashed = {
   type: '/problems/job-crashed';
-  title: 'The process of the job died repeatedly';
+  title: 'The process that did this work died';
   status: 500;
   /** What is wrong and what to do. */
   detail: string;
@@ -1248,7 +1285,7 @@ export type ProblemJobCrashed = {
 /** For jobs, and for the check of an upload. */
 export type ProblemTimeout = {
   type: '/problems/timeout';
-  title: 'The time limit was reached';
+  title: 'The work took longer than its time limit';
   status: 503;
   /** What is wrong and what to do. */
   detail: string;
@@ -1270,7 +1307,7 @@ export type ProblemNotReady = {
 
 export type ProblemNoMemory = {
   type: '/problems/no-memory';
-  title: 'Out of memory';
+  title: 'The daemon has no memory left';
   status: 503;
   /** What is wrong and what to do. */
   detail: string;
@@ -1282,7 +1319,7 @@ export type ProblemNoMemory = {
 
 export type ProblemUnavailable = {
   type: '/problems/unavailable';
-  title: 'The service is unavailable';
+  title: 'The daemon cannot answer this now';
   status: 503;
   /** What is wrong and what to do. */
   detail: string;

@@ -30,7 +30,8 @@ export interface Shape {
   sphere?: SphereState;
   /** the sphere after the alignment; `result` is the supermesh it belongs to */
   aligned?: SphereState & { result: string };
-  error?: { result: string; values: Float32Array; max: number; rms: number; model: Model };
+  /** of the morph `result`; its model is the shape, or a template at the shape, painted from 0 to `top` */
+  error?: { result: string; max: number; rms: number; top: number; model: Model };
 }
 
 export interface SphereState {
@@ -92,10 +93,13 @@ export interface Running {
   abort: AbortController;
   /** the fast morph that is shown until this one is done; `ended` never rejects */
   fast: { job: Job | null; abort: AbortController; ended: Promise<void> } | null;
+  /** the match that is computed, of a morph that has several */
+  matches?: Matches;
 }
 
 /** The requests of a morph that was matched without landmarks and of its alternatives, and which of them is shown. */
 export interface Matches {
+  best: Supermesh; // the first of them, whose answer lists the others
   requests: SupermeshRequest[];
   at: number; // the shown one
   tried?: number; // the last one that was sent
@@ -121,6 +125,9 @@ export interface Result {
 
 export const presetOf = (result: Result) =>
   (result.supermesh.request ?? result.request)?.align?.options?.preset ?? 'default';
+/** Whether the first shape's own mesh carries the morph, so that the error is where that mesh is too coarse. */
+export const isTemplate = (result: Result) =>
+  (result.supermesh.request ?? result.request)?.remesh?.method === 'template';
 export const isFast = (result: Result) => presetOf(result) === 'fast';
 
 /** Whether the default morph is still to come: what is shown is not what a download gives. */

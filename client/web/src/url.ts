@@ -1,14 +1,15 @@
 /**
  * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
- * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), t: time along the morph, l: landmarks (a vertex or x_y_z for each
- * shape), cam: camera, o: options.
+ * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), q: the best match, which of its
+ * matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
+ * cam: camera, o: options.
  */
 import type { Place } from 'orbmorph';
-import { client, DEFAULTS, readyShapes, set, state, TABS, watch, type Options, type Tab } from './state';
+import { client, DEFAULTS, readyShapes, set, state, TABS, watch, type Matches, type Options, type Tab } from './state';
 import { addFromServer } from './actions/shapes';
 import { takeLandmarks } from './actions/landmarks';
-import { openResult, resumeJob } from './actions/merge';
+import { matchesOf, openResult, resumeJob } from './actions/merge';
 import { setPaint } from './actions/spheres';
 import { openSupermesh } from './actions/server';
 import { player } from './player';
@@ -57,6 +58,25 @@ function decodeOptions(text: string): Options {
   };
 }
 
+/** Of several matches: ID of the best one, number of the shown one, number of the one that is computed. */
+function encodeMatch(): string {
+  const { result, running } = state;
+  const shown = result?.matches;
+  const next = running?.job ? running.matches : undefined;
+  const best = next?.best ?? shown?.best;
+  if (!best || (!next && !shown?.at)) return '';
+  return [best.id, shown?.at ?? 0, ...(next ? [next.at] : [])].join(',');
+}
+
+/** The best match that a URL names, and the numbers of those that are shown and computed. */
+async function decodeMatch(text: string): Promise<{ shown?: Matches; next?: Matches }> {
+  const [id, ...numbers] = text.split(',');
+  if (!/^[0-9a-f]{64}$/.test(id)) return {};
+  const best = await client.getSupermesh(id).catch(() => null);
+  const [shown, next] = numbers.map((at) => (best && matchesOf(best, Number(at))) || undefined);
+  return { shown, next };
+}
+
 function encode(): string {
   const parts: string[] = [];
   const put = (key: string, value: string) => value && parts.push(`${key}=${value}`);
@@ -66,6 +86,7 @@ function encode(): string {
   put('r', state.result?.supermesh.id ?? '');
   put('j', state.running?.job?.id ?? '');
   if (state.running?.job && state.running.purpose === 'find') put('find', '1');
+  put('q', encodeMatch());
   if (state.result && !state.playing) put('t', player.time.toFixed(3));
   put(
     'l',
@@ -95,9 +116,16 @@ const dead = (what: string) =>
     },
   });
 
+/** The browser takes some 30 ms for a new URL: it draws its address and loads the icon. So it is written at rest. */
+const REST = 600; // ms: longer than a frame of a large shape
+const LONGEST = 2400; // ms, after which it is written all the same
 let timer = 0;
+let since = 0;
 function save() {
-  if (restoring || timer) return;
+  const now = performance.now();
+  if (restoring || (timer && now - since > LONGEST - REST)) return;
+  if (!timer) since = now;
+  clearTimeout(timer);
   timer = window.setTimeout(() => {
     timer = 0;
     if (restoring) return;
@@ -107,12 +135,13 @@ function save() {
     if (next === written) return;
     written = next;
     history.replaceState(null, '', next || location.pathname + location.search);
-  }, 250);
+  }, REST);
 }
 
 export async function restore() {
   const query = new URLSearchParams(location.hash.slice(1).replace(/\+/g, '%2B'));
   restoring = true;
+  let next: Matches | undefined;
   try {
     const camera = query.get('cam');
     if (camera) stage.orbit.restore(camera);
@@ -149,8 +178,12 @@ export async function restore() {
     if (paint) setPaint(paint);
     if (query.get('wire')) set({ wire: true });
     if (result && ids.length) {
-      const supermesh = await client.getSupermesh(result).catch(() => null);
-      if (supermesh) await openResult(supermesh, supermesh.request ?? null);
+      const [supermesh, matches] = await Promise.all([
+        client.getSupermesh(result).catch(() => null),
+        decodeMatch(query.get('q') ?? ''),
+      ]);
+      next = matches.next;
+      if (supermesh) await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown });
       else if (!state.problem)
         set({
           problem: {
@@ -171,13 +204,13 @@ export async function restore() {
     restoring = false;
   }
   const job = query.get('j');
-  if (job) void resumeJob(job, query.get('find') ? 'find' : 'morph');
+  if (job) void resumeJob(job, query.get('find') ? 'find' : 'morph', next);
 }
 
 /** Keeps the URL up to date. Pasting a URL of another state reloads the page with that state. */
 export function keepUrl() {
   watch(save);
-  player.listen(save);
+  player.listen(() => state.playing || save()); // a playing morph has no time in its URL
   stage.onMoved = save;
   window.addEventListener('hashchange', () => {
     if (location.hash !== written) location.reload();

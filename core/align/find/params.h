@@ -41,7 +41,9 @@ static const double ORB_FIND_DIFFERENT = 0.15;
 /* Matches that must agree with landmarks (hint.c). */
 
 enum {
-  ORB_FIND_HINT_LEAST = 4,  /* landmarks; fewer do not tell a pose from other proportions */
+  ORB_FIND_HINT_LEAST = 4, /* landmarks; fewer do not tell a pose from other proportions */
+  ORB_FIND_HINT_FEW = 8, /* landmarks that a match must agree with, and that are moved to their partners first: as many
+                            as a body has tips. With 4 or 24 at first, a third of the pairs folded */
   ORB_FIND_HINT_SOURCES = 6 /* landmarks from which distances are measured; each takes 1 ms */
 };
 /* Distances shorter than this are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.

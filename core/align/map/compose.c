@@ -27,6 +27,9 @@
  * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c) before the
  * moving shape is registered again through samples of it, and at the end.
  *
+ * A large shape is not moved as a whole: it is the fixed one, or a decimated copy of it has its map already, which is
+ * refined (lifted.c).
+ *
  * Soft landmarks are pinned first, as all are. Then the map is let go where they were, and springs hold them instead.
  */
 #include "align/map/compose.h"
@@ -38,6 +41,7 @@
 #include "align/map/engine/run.h"
 #include "align/map/engine/step.h"
 #include "align/map/levels.h"
+#include "align/map/lifted.h"
 #include "align/map/start.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
@@ -335,7 +339,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
                    .twisted_energy = INFINITY};
   int swap = 0;
   *improved = 0;
-  if (both && !guide->target) {
+  if (both && !guide->target && fixed->mesh.vertex_count <= c.params.copies.large) {
     ORB_TRY(orb_map_should_swap(ctx, &c.params, fixed, moving, &swap));
   }
   if (swap) {
@@ -350,7 +354,10 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   c.work = c.params.work.all * (int64_t)moving->mesh.vertex_count;
   orb_status status;
   ORB_GO(status, prepare(&c), done);
-  ORB_GO(status, given_energy(&c, &energy[0]), done);
+  energy[0] = INFINITY;
+  if (guide->from != ORB_MAP_FROM_COPY) {
+    ORB_GO(status, given_energy(&c, &energy[0]), done);
+  }
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, orb_map_pairs_create(&c), done);
@@ -359,6 +366,8 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, snap(&c), done);
   } else if (guide->from == ORB_MAP_FROM_PINS) {
     ORB_GO(status, let_go(&c), done);
+  } else if (guide->from == ORB_MAP_FROM_COPY) {
+    ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
     if (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0]) {

@@ -12,6 +12,7 @@
  *   start.h   one start, and passes of starts through samples of the best map
  *   targets.h the order of the starts where targets are given
  *   walked.h  the quick way: a landmark walk, optimised on a coarse level
+ *   lifted.h  the map of a decimated copy, refined to all vertices
  *   compose.c the order of the starts
  */
 #ifndef ORB_ALIGN_MAP_COMPOSE_H

@@ -36,25 +36,32 @@ static orb_status read_level(orb_context *ctx, const orb_mesh *mesh, const orb_r
   return ORB_OK;
 }
 
-orb_status orb_coarse_copy_create(orb_context *ctx, const orb_mesh *mesh, int32_t size, orb_coarse_copy *out) {
+orb_status orb_coarse_copy_level(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep, int32_t keep_until,
+                                 int32_t size, orb_preset preset, orb_hierarchy **hierarchy, orb_coarse_copy *out) {
   orb_status status = ORB_E_NO_MEMORY;
-  orb_hierarchy *hierarchy = NULL;
   orb_refiner *refiner = NULL;
   orb_embed_options options;
   int32_t n = mesh->vertex_count, *number = ORB_NEW(ctx, int32_t, n);
   memset(out, 0, sizeof *out);
+  *hierarchy = NULL;
   orb_embed_defaults(&options);
-  options.preset = ORB_PRESET_FAST;
+  options.preset = preset;
   if (!number) {
     goto end;
   }
-  ORB_GO(status, orb_hierarchy_create(ctx, mesh, NULL, 4, &hierarchy), end);
-  ORB_GO(status, orb_refiner_create(ctx, hierarchy, &options, &refiner), end);
+  ORB_GO(status, orb_hierarchy_create(ctx, mesh, keep, keep_until, hierarchy), end);
+  ORB_GO(status, orb_refiner_create(ctx, *hierarchy, &options, &refiner), end);
   ORB_GO(status, orb_refiner_advance(ctx, refiner, n < size ? n : size), end);
   status = read_level(ctx, mesh, refiner, number, out);
 end:
   orb_refiner_destroy(ctx, refiner);
-  orb_hierarchy_destroy(ctx, hierarchy);
   orb_free(ctx, number);
+  return status;
+}
+
+orb_status orb_coarse_copy_create(orb_context *ctx, const orb_mesh *mesh, int32_t size, orb_coarse_copy *out) {
+  orb_hierarchy *hierarchy;
+  orb_status status = orb_coarse_copy_level(ctx, mesh, NULL, 4, size, ORB_PRESET_FAST, &hierarchy, out);
+  orb_hierarchy_destroy(ctx, hierarchy);
   return status;
 }

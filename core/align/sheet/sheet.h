@@ -10,6 +10,7 @@
  *   collapse.h   collapses of vertices that splits made
  *   thin.h       removes such vertices where nothing needs them
  *   copy.h       decimated copies of shapes
+ *   copies.h     such copies in place of the later shapes of an alignment
  */
 #ifndef ORB_ALIGN_SHEET_SHEET_H
 #define ORB_ALIGN_SHEET_SHEET_H
@@ -41,6 +42,9 @@ typedef struct orb_sheet {
 ORB_MUST_CHECK orb_status orb_sheet_create(orb_context *ctx, const orb_mesh *mesh, const double *points,
                                            orb_sheet *out);
 void orb_sheet_free(orb_context *ctx, orb_sheet *sheet);
+
+/* Frees a released shape and zeroes it. */
+void orb_aligned_shape_free(orb_context *ctx, orb_aligned_shape *shape);
 
 /* A second, independent copy. */
 ORB_MUST_CHECK orb_status orb_sheet_copy(orb_context *ctx, const orb_sheet *sheet, orb_sheet *out);

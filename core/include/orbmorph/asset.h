@@ -15,6 +15,12 @@ typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } or
 typedef enum orb_holes { ORB_HOLES_REOPEN = 0, ORB_HOLES_FILLED } orb_holes;
 typedef enum orb_path { ORB_PATH_LINEAR = 0, ORB_PATH_RIGID } orb_path;
 
+/* A morph target besides the shapes. */
+typedef struct orb_asset_target {
+  char name[ORB_NAME_MAX];
+  float *moves; /* 3 a supermesh vertex, from the first shape */
+} orb_asset_target;
+
 typedef struct orb_asset_options {
   int normals; /* write normals; 1 */
   orb_animation animation;
@@ -24,6 +30,12 @@ typedef struct orb_asset_options {
   int colors;         /* also write the colours of the later shapes, as morphed attributes; 0 */
   orb_holes holes;    /* REOPEN: leave out the triangles that fill holes of the first shape, where the supermesh has
                          their rims */
+  /* split_count lists of a number for each corner of the supermesh: corners share a vertex of the file only if their
+     numbers agree in every list. The lists that are NULL are skipped. */
+  const int32_t *const *splits;
+  int32_t split_count;
+  int32_t target_count;
+  const orb_asset_target *targets; /* they come after the shapes and in-betweens, and no animation shows them */
 } orb_asset_options;
 ORB_API void orb_asset_defaults(orb_asset_options *options);
 
@@ -32,7 +44,7 @@ typedef struct orb_asset_facts {
   int32_t vertex_count;       /* after splits for normals, seams and materials */
   int32_t triangle_count;     /* without those that fill holes which are open again */
   int32_t primitive_count;    /* one for each material that is used */
-  int32_t target_count;       /* later shapes, then in-betweens */
+  int32_t target_count;       /* later shapes, then in-betweens, then those of the options */
   int32_t morphed_attributes; /* over all targets; glTF requires clients to support only 8 at once */
   int32_t nudged_vertices;    /* moved by units in the last place to keep them distinct, see orb_asset_write() */
 } orb_asset_facts;

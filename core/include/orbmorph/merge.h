@@ -4,6 +4,7 @@
 
 #include "orbmorph/align.h"
 #include "orbmorph/asset.h"
+#include "orbmorph/carry.h"
 #include "orbmorph/kept.h"
 #include "orbmorph/profile.h"
 
@@ -21,6 +22,10 @@ typedef struct orb_merge_options {
   const unsigned char *file_bytes;
   size_t file_size;
   orb_document_parts file_parts; /* see orb_document */
+  /* What to carry onto the supermesh besides positions; files: of the shapes that it names, shape_count. */
+  const orb_carry *carries;
+  int32_t carry_count;
+  const orb_shape_file *files;
 } orb_merge_options;
 ORB_API void orb_merge_defaults(orb_merge_options *options);
 
@@ -73,10 +78,24 @@ typedef struct orb_warning {
   orb_warning_part parts[ORB_WARNING_PARTS];
 } orb_warning;
 
+enum { ORB_COARSE_LISTED = 32 };
+
+/* Which triangles of a template are too coarse for a shape: at samples, they and the shape are farther apart than the
+ * tolerance. */
+typedef struct orb_coarse {
+  double share;  /* of the template's area on the shape */
+  int64_t count; /* of the triangles */
+  /* The farthest of them, the farthest first, as numbers of the first shape's file, with their distances in the shape's
+   * units. Triangles that a repair made have no number and are not listed. */
+  int32_t listed, triangles[ORB_COARSE_LISTED];
+  double errors[ORB_COARSE_LISTED];
+} orb_coarse;
+
 typedef struct orb_merge_result {
   orb_alignment alignment;
   orb_supermesh supermesh;
   orb_shape_report *shapes; /* shape_count */
+  orb_coarse *coarse;       /* shape_count; NULL unless the method is template */
   /* landmark_count × shape_count: distance from the requested place to the landmark's supermesh vertex, in units of
    * the shape's diagonal. If a landmark has no vertex: to the shape's place at the mean of the landmark's points
    * on the sphere. */
@@ -100,8 +119,10 @@ typedef struct orb_merge_result {
   orb_dropped *dropped; /* see orb_asset_dropped() */
   orb_buffer asset;
   int is_document; /* the asset is the document of the first shape, see orb_asset_write_document() */
-  orb_profile_facts profiles[ORB_PROFILES]; /* what the profiles of the asset change; that of float is 0. A kept
-                                               document has no other */
+  int32_t carried_count;
+  orb_carried *carried;                     /* what the options asked to carry, in the order of the asset */
+  int has_profiles;                         /* 0: a kept document, or more than targets was carried onto the asset */
+  orb_profile_facts profiles[ORB_PROFILES]; /* what the profiles of the asset change; that of float is 0 */
   orb_merge_timings timings;
 } orb_merge_result;
 

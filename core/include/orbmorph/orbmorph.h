@@ -5,6 +5,7 @@
 #include "orbmorph/align.h"
 #include "orbmorph/alignment.h"
 #include "orbmorph/asset.h"
+#include "orbmorph/carry.h"
 #include "orbmorph/context.h"
 #include "orbmorph/embed.h"
 #include "orbmorph/format.h"

@@ -12,6 +12,14 @@ extern "C" {
 ORB_API ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
                                                          const orb_place *places, int32_t count, double *out);
 
+/* Converts a place on an aligned shape to one on the mesh that was aligned. */
+ORB_API void orb_place_before(const orb_mesh *mesh, const orb_aligned_shape *shape, const orb_place *from,
+                              orb_place *out);
+
+/* Converts a place on a repaired mesh to one in its file; triangle −1 if the file has no such triangle. corners: the
+ * vertices of the triangles of the file, 3 a triangle, in the numbers of the file. */
+ORB_API void orb_place_in_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out);
+
 /* How well shape s is reproduced; lengths in its own units. Samples are face centres, edge midpoints and vertices.
  * Without a proved bound all of them count. With one, at most 4096 of each kind on each surface count; they give rms
  * and angles to about 2 %. */

@@ -9,7 +9,7 @@ const components = {
   5125: Uint32Array,
   5126: Float32Array,
 };
-const widths = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
+const widths = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 };
 
 export function parseGlb(bytes) {
   assert.equal(bytes.toString('latin1', 0, 4), 'glTF');

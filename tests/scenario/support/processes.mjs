@@ -33,12 +33,22 @@ export function megabytes(d) {
   return kilobytes / 1024;
 }
 
-/** Seconds of processor time of all processes that have ended, which checked meshes and ran jobs. */
+/** Seconds of processor time of the processes that checked meshes and ran jobs; some check further files. */
 export function workSeconds(d) {
-  let ticks = 0;
-  for (const pid of children(d.child.pid)) {
+  let ticks = 0; // of 1/100 s
+  const add = (pid, at) => {
     const fields = readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ');
-    ticks += Number(fields[13]) + Number(fields[14]); // of its children, in ticks of 1/100 s
+    ticks += Number(fields[at]) + Number(fields[at + 1]);
+  };
+  for (const fork of children(d.child.pid)) {
+    for (const pid of children(fork)) {
+      try {
+        add(pid, 11);
+      } catch {
+        // it has ended
+      }
+    }
+    add(fork, 13); // those that have ended
   }
   return ticks / 100;
 }

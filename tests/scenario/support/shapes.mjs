@@ -229,3 +229,51 @@ export function parse(text) {
   }
   return { positions, triangles };
 }
+
+/** A flat plate with nx × ny square holes, each of which is a handle. map: of its points. */
+export function grating(nx, ny, map = (p) => p) {
+  const [w, h] = [2 * nx + 1, 2 * ny + 1];
+  const positions = [];
+  const triangles = [];
+  const ids = new Map();
+  const is = (i, j) => i >= 0 && j >= 0 && i < w && j < h && !(i % 2 && j % 2);
+  const at = (x, y, z) => {
+    const key = `${x},${y},${z}`;
+    if (!ids.has(key)) ids.set(key, positions.push(map([x, y, z])) - 1);
+    return ids.get(key);
+  };
+  const quad = (...corners) => {
+    const [a, b, c, d] = corners.map((p) => at(...p));
+    triangles.push([a, b, c], [a, c, d]);
+  };
+  for (let x = 0; x < w; x++)
+    for (let y = 0; y < h; y++) {
+      if (!is(x, y)) continue;
+      const [X, Y] = [x + 1, y + 1];
+      quad([x, y, 1], [X, y, 1], [X, Y, 1], [x, Y, 1]);
+      quad([x, y, 0], [x, Y, 0], [X, Y, 0], [X, y, 0]);
+      if (!is(x - 1, y)) quad([x, y, 0], [x, y, 1], [x, Y, 1], [x, Y, 0]);
+      if (!is(X, y)) quad([X, y, 0], [X, Y, 0], [X, Y, 1], [X, y, 1]);
+      if (!is(x, y - 1)) quad([x, y, 0], [X, y, 0], [X, y, 1], [x, y, 1]);
+      if (!is(x, Y)) quad([x, Y, 0], [x, Y, 1], [X, Y, 1], [X, Y, 0]);
+    }
+  return { positions, triangles };
+}
+
+/**
+ * A figure with head, arms, legs and belly, the same on its left (−x) and right. lengths: of an arm, a leg, the head and the
+ * belly; depth: of the whole from front to back.
+ */
+export function figure([arm, leg, head, belly], depth = 0.6, levels = 4) {
+  const bump = (p, d, width) => {
+    const cosine = (p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) / Math.hypot(...d);
+    return Math.exp(-((Math.acos(Math.max(-1, Math.min(1, cosine))) / width) ** 2));
+  };
+  return ball(levels, (p) => {
+    const q = [Math.abs(p[0]), p[1], p[2]];
+    const sides = arm * (bump(q, [1, 0.3, 0], 0.35) + bump(q, [-1, 0.3, 0], 0.35));
+    const feet = leg * (bump(q, [0.6, -1, 0], 0.3) + bump(q, [-0.6, -1, 0], 0.3));
+    const r = 0.6 + sides + feet + head * bump(q, [0, 1, 0], 0.35) + belly * bump(q, [0, 0.2, 1], 0.5);
+    return [r * p[0], r * p[1], depth * r * p[2]];
+  });
+}

@@ -15,6 +15,7 @@ import {
   client,
   givenLandmarks,
   isFast,
+  isTemplate,
   readyShapes,
   set,
   state,
@@ -87,8 +88,8 @@ export async function flipMatch() {
 async function sendMatch(matches: Matches, at: number) {
   if (state.running) return;
   matches.tried = at; // one that fails is passed over next time
-  const next = { requests: matches.requests, at, told: matches.told };
-  const running: Running = { purpose: 'morph', job: null, abort: new AbortController(), fast: null };
+  const next: Matches = { best: matches.best, requests: matches.requests, at, told: matches.told };
+  const running: Running = { purpose: 'morph', job: null, abort: new AbortController(), fast: null, matches: next };
   set({ running, problem: null });
   const request = next.requests[next.at];
   await follow(
@@ -113,12 +114,11 @@ function foundIn({ landmarks = [], request }: Supermesh): { name?: string; at: P
     : [];
 }
 
-/** Finds out what the alternatives of a match do otherwise. */
-async function tellOthers(result: Result) {
-  const { supermesh, matches } = result;
-  const { alternatives = [] } = supermesh;
-  if (!matches || matches.told || !alternatives.length || !isOfPage(supermesh)) return;
-  const found = foundIn(supermesh).map(({ name = '', at }) => ({ name, at }));
+/** Finds out what the other matches do otherwise than the best one. */
+async function tellOthers({ matches }: Result) {
+  if (!matches || matches.told || !isOfPage(matches.best)) return;
+  const { alternatives = [] } = matches.best;
+  const found = foundIn(matches.best).map(({ name = '', at }) => ({ name, at }));
   const others = await work(
     'others',
     readyShapes().map(({ key }) => key),
@@ -135,11 +135,11 @@ async function tellOthers(result: Result) {
   set();
 }
 
-/** The requests of a morph that was matched without landmarks, and of its alternatives. */
-function matchesOf(supermesh: Supermesh): Matches | null {
-  const others = supermesh.alternatives ?? [];
-  return others.length && supermesh.request
-    ? { requests: [supermesh.request, ...others.map(({ request }) => request)], at: 0 }
+/** The requests of a morph that was matched without landmarks, and of its alternatives. at: which of them is shown. */
+export function matchesOf(best: Supermesh, at = 0): Matches | null {
+  const others = best.alternatives ?? [];
+  return others.length && best.request && at >= 0 && at <= others.length
+    ? { best, requests: [best.request, ...others.map(({ request }) => request)], at }
     : null;
 }
 
@@ -173,9 +173,9 @@ function showFast(running: Running, request: SupermeshRequest): Promise<void> {
   });
 }
 
-/** Follows a job that an earlier visit started. */
-export async function resumeJob(id: string, purpose: Running['purpose'] = 'morph') {
-  const running: Running = { purpose, job: null, abort: new AbortController(), fast: null };
+/** Follows a job that an earlier visit started. `matches`: those of which it computes one. */
+export async function resumeJob(id: string, purpose: Running['purpose'] = 'morph', matches?: Matches) {
+  const running: Running = { purpose, job: null, abort: new AbortController(), fast: null, matches };
   set({ running });
   const { signal } = running.abort;
   await follow(
@@ -189,6 +189,7 @@ export async function resumeJob(id: string, purpose: Running['purpose'] = 'morph
       }
     },
     null,
+    matches,
   );
 }
 
@@ -201,7 +202,7 @@ async function follow(
   running: Running,
   get: () => Promise<Supermesh>,
   request: SupermeshRequest | null,
-  matches: Matches | null = null,
+  matches?: Matches,
 ) {
   try {
     const supermesh = await get();
@@ -257,7 +258,7 @@ export function cancelMerge() {
 export async function openResult(
   supermesh: Supermesh,
   request: SupermeshRequest | null,
-  { keep = false, signal, matches = null }: { keep?: boolean; signal?: AbortSignal; matches?: Matches | null } = {},
+  { keep = false, signal, matches }: { keep?: boolean; signal?: AbortSignal; matches?: Matches } = {},
 ) {
   if (!keep) set({ loading: 'Loading the morph' });
   try {
@@ -317,7 +318,10 @@ export function clearResult() {
 
 const isFitted = (shape: Supermesh['shapes'][number]) => (shape.fit?.kind ?? 'none') !== 'none';
 
-/** Measures the supermesh's error on every shape and paints it on the original surface. */
+/** Relative errors of this size come from coordinates of 32 bits: they are painted as none. */
+const ROUNDING = 1e-5;
+
+/** Measures the supermesh's error on every shape and paints it on the original surface, or on a template. */
 export async function measureErrors() {
   const { result } = state;
   if (!result) return;
@@ -334,10 +338,14 @@ export async function measureErrors() {
         index,
         isFitted(result.supermesh.shapes[index]),
       );
-      const model = shape.model!.copy();
-      model.attribute('value', found.values);
-      model.paint({ kind: 'value', ramp: 'heat', low: 0, high: Math.max(found.max, 1e-9) });
-      shape.error = { result: result.supermesh.id, model, ...found };
+      const { max, rms } = found;
+      const onTemplate = isTemplate(result) && index > 0;
+      const model = (onTemplate ? result.each[index] : shape.model!).copy();
+      if (onTemplate) model.weights(result.data.shapes[index] ?? []);
+      model.attribute('value', onTemplate ? found.made : found.values);
+      const top = Math.max(max, ROUNDING);
+      model.paint({ kind: 'value', ramp: 'heat', low: 0, high: top });
+      shape.error = { result: result.supermesh.id, model, max, rms, top };
     } catch (error) {
       toast((error as Error).message, 'error');
     }

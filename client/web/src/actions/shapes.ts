@@ -189,10 +189,35 @@ export function moveShape(key: string, by: number) {
 }
 
 /** Uploads the file with further repairs beside those that it was uploaded with. */
-export function uploadAgain(key: string, repair: string) {
+export async function uploadAgain(key: string, repair: string) {
   const shape = shapeOf(key);
-  if (shape?.file) void send(shape, withRepairs(shape.repair ?? 'safe', repair));
+  if (!shape?.file) return;
+  await send(shape, withRepairs(shape.repair ?? 'safe', repair));
+  if (repair.includes(CLOSE)) await closeTheRest(shape, Number(repair.split(`${CLOSE}:`)[1] ?? SMALL));
 }
+
+const CLOSE = 'close_handles';
+/** The daemon's own limit of a handle that it closes, and the largest limit that it takes: relative to the diagonal. */
+const SMALL = 0.05;
+const LARGEST = 10;
+/** A refusal shows a hundred loops at most, and a cut can lengthen others: each round allows the longest of those left. */
+const ROUNDS = 8;
+
+/** Closes the handles that are left after a repair with this `size`. */
+async function closeTheRest(shape: Shape, size: number) {
+  for (let round = 0; round < ROUNDS && shape.state === 'refused' && shapeOf(shape.key) === shape; round++) {
+    const next = sizeFor(numbers(shape.problem?.loop_lengths_relative));
+    if (next <= size || next > LARGEST) return;
+    size = next;
+    await send(shape, withRepairs(shape.repair ?? 'safe', `safe,${CLOSE}:${size}`));
+  }
+}
+
+/** The size that allows loops of these lengths; 0 if there are none. */
+const sizeFor = (lengths: number[]) => {
+  const longest = Math.max(0, ...lengths);
+  return longest > SMALL ? Number((1.01 * longest).toPrecision(3)) : longest && SMALL;
+};
 
 /** The pieces after the largest, as many as there is room for. */
 function otherParts(parts: unknown): { repair: string; label: string }[] {
@@ -203,14 +228,13 @@ function otherParts(parts: unknown): { repair: string; label: string }[] {
   }));
 }
 
-/** The loops on show can be cut along once `handle_size` allows the longest of them. */
+/** One button closes all handles, those too that are not among the loops on show. */
 function handleRepairs(lengths: number[], genus: number): { repair: string; label: string }[] {
-  const longest = Math.max(0, ...lengths);
-  if (lengths.length < genus || longest === 0 || longest > 9) return [];
-  const label = genus === 1 ? 'Close the handle' : `Close ${genus} handles`;
-  if (longest <= 0.05) return [{ repair: 'safe,close_handles', label }];
-  const size = Number((longest * 1.01).toPrecision(3));
-  return [{ repair: `safe,close_handles:${size}`, label: `${label} along the red loop${genus === 1 ? '' : 's'}` }];
+  const size = sizeFor(lengths);
+  if (size === 0 || size > LARGEST) return [];
+  const label = genus === 1 ? 'Close the handle' : `Close all ${genus.toLocaleString('en')} handles`;
+  if (size === SMALL) return [{ repair: `safe,${CLOSE}`, label }];
+  return [{ repair: `safe,${CLOSE}:${size}`, label: `${label} along the red loop${genus === 1 ? '' : 's'}` }];
 }
 
 /** The repairs that the page offers for a refusal. */

@@ -341,7 +341,7 @@ const ops = {
     morphKey: string,
     shape: number,
     fitted: boolean,
-  ): { values: Float32Array; max: number; rms: number } {
+  ): { values: Float32Array; made: Float32Array; max: number; rms: number } {
     const mesh = held.get(key);
     const morph = morphs.get(morphKey);
     if (!mesh || !morph) throw new Error('The shape or the morph is not loaded.');
@@ -361,10 +361,15 @@ const ops = {
     let sum = 0;
     let count = 0;
     const p = raw.positions;
+    const made = new Float32Array(morph.position.length / 3);
     const away = (x: number, y: number, z: number) => {
       const hit = bvh.closest(x, y, z, last) ?? bvh.closest(x, y, z);
       last = (hit?.t ?? 0) * 4 + 0.02 * frame.radius;
       const d = (hit?.t ?? 0) / (2 * frame.radius);
+      for (let c = 0; hit && c < 3; c++) {
+        const v = morph.index[3 * hit.triangle + c];
+        made[v] = Math.max(made[v], d);
+      }
       max = Math.max(max, d);
       sum += d * d;
       count++;
@@ -391,7 +396,7 @@ const ops = {
     const display = buildDisplay(raw);
     const values = new Float32Array(display.position.length / 3);
     for (let c = 0; c < raw.corners.length; c++) values[display.index[c]] = distance[raw.corners[c]];
-    return { values, max, rms: Math.sqrt(sum / Math.max(count, 1)) };
+    return { values, made, max, rms: Math.sqrt(sum / Math.max(count, 1)) };
   },
 };
 

@@ -1,14 +1,12 @@
 /** What the answer says about the map: how sure the match is, and where the map may be wrong. */
 import { set, state, type Result } from '../state';
 import { flipMatch, flippedOf, nextMatch } from '../actions/merge';
-import { sideOf } from '../mesh/others';
+import { isWord, sideOf } from '../mesh/others';
 import { player } from '../player';
-import { Button } from './parts';
+import { Button, count, relative } from './parts';
 
 /** Another match lowers the confidence if it bends the shapes less than twice as much. Others are not worth a word. */
 const CREDIBLE = 2;
-
-const isWord = (name: string) => !!name && !/^(auto|pair) \d+$/.test(name);
 
 /** What may be otherwise, in words, by the best other match that has any: "the tail of dog may be the … of giraffe". */
 function doubtOf({ matches, supermesh: { shapes } }: Result): string | null {
@@ -140,5 +138,40 @@ export function Warnings({ result: { supermesh } }: { result: Result }) {
         </li>
       ))}
     </ul>
+  );
+}
+
+/** Where a template has too few triangles for the other shapes. */
+export function Coarse({ result: { supermesh } }: { result: Result }) {
+  const [first, ...others] = supermesh.shapes;
+  const missed = others.filter(({ coarse }) => coarse);
+  if (!missed.length) return null;
+  return (
+    <>
+      <ul class="hint" aria-label="Where the mesh is too coarse">
+        {missed.map(({ name, coarse }) => (
+          <li key={name}>
+            {`The mesh of ${first.name} is too coarse for ${name}: ${count(coarse!.count)} of its triangles, ${Number(
+              (100 * coarse!.share).toPrecision(2),
+            )} % of the surface, miss it by more than the tolerance${
+              coarse!.errors_relative.length ? `, by up to ${relative(coarse!.errors_relative[0])}` : ''
+            }. Subdivide it there.`}
+          </li>
+        ))}
+      </ul>
+      {state.show !== 'error' && (
+        <div class="row">
+          <Button
+            title="A heat map of the distance, on the mesh"
+            onClick={() => {
+              player.pause();
+              set({ show: 'error' });
+            }}
+          >
+            Show where
+          </Button>
+        </div>
+      )}
+    </>
   );
 }

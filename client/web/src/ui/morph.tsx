@@ -1,6 +1,6 @@
 /** The Morph tab: playing, scrubbing and mixing; the common mesh on each shape; the error; downloads. */
 import { useEffect, useRef } from 'preact/hooks';
-import { isFast, isWaiting, presetOf, set, state, tint, toast, type Result } from '../state';
+import { isFast, isTemplate, isWaiting, presetOf, set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
 import { explain } from '../actions/token';
 import { measureErrors, measureStretch, STRETCHED } from '../actions/merge';
@@ -8,7 +8,7 @@ import { player } from '../player';
 import { client } from '../state';
 import { Beside } from './beside';
 import { Legend, Name } from './labels';
-import { Match, Suspects, Turned, Warnings } from './match';
+import { Coarse, Match, Suspects, Turned, Warnings } from './match';
 import { Button, count, Icon, relative, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';
@@ -70,8 +70,12 @@ export function MorphStage() {
                 <Legend
                   ramp="heat"
                   low="0"
-                  high={relative(shape.error.max)}
-                  label="distance from the common mesh, relative to the shape's size"
+                  high={relative(shape.error.top)}
+                  label={
+                    isTemplate(result) && i > 0
+                      ? `how far ${shape.name} is from the mesh of ${result.supermesh.shapes[0].name}, shown, relative to its size`
+                      : "distance from the common mesh, relative to the shape's size"
+                  }
                 />
               )}
             </Pane>
@@ -224,6 +228,7 @@ export function MorphInspector() {
       <Turned result={result} />
       <Suspects result={result} />
       <Warnings result={result} />
+      <Coarse result={result} />
       <Segments
         label="What is shown"
         value={state.show}

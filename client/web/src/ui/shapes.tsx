@@ -157,7 +157,7 @@ function ShapeCard({ shape, index }: { shape: Shape; index: number }) {
             <p>{shape.message}</p>
           </div>
           {shape.file && shape.state === 'failed' && (
-            <Button onClick={() => uploadAgain(shape.key, state.options.repair)}>Try again</Button>
+            <Button onClick={() => void uploadAgain(shape.key, state.options.repair)}>Try again</Button>
           )}
         </div>
       )}
@@ -198,7 +198,7 @@ function Refusal({ shape }: { shape: Shape }) {
         )}
         <div class="row wrap">
           {repairsFor(problem).map((option) => (
-            <Button key={option.repair} onClick={() => uploadAgain(shape.key, option.repair)}>
+            <Button key={option.repair} onClick={() => void uploadAgain(shape.key, option.repair)}>
               {option.label}
             </Button>
           ))}

@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+#include "embed/newton/hierarchy.h"
+
 /* What the first spatial targets of a composed map follow. */
 typedef enum orb_map_from {
   ORB_MAP_FROM_SPACE, /* what fits best in space */
@@ -11,7 +13,8 @@ typedef enum orb_map_from {
   ORB_MAP_FROM_WALK,  /* none: a landmark walk alone, which is quick. Needs `both` */
   ORB_MAP_FROM_WALKS, /* none: samples of the given targets guide landmark walks. Needs `both` */
   ORB_MAP_FROM_NEAR,  /* none: the map as given takes the landmarks near their partners, and they are moved there */
-  ORB_MAP_FROM_PINS   /* none: the map as given is only let go where it was pinned. For springs */
+  ORB_MAP_FROM_PINS,  /* none: the map as given is only let go where it was pinned. For springs */
+  ORB_MAP_FROM_COPY   /* none: a decimated copy of the moving shape has its map already. The map as given is not used */
 } orb_map_from;
 
 /* Vertices of the two shapes that springs draw together. */
@@ -21,12 +24,21 @@ typedef struct orb_map_springs {
   double *weight; /* stiffness, against an energy of 1 for an isometry and in radii of a ball of the shape's area */
 } orb_map_springs;
 
+/* A level of the moving shape and its map. */
+typedef struct orb_map_level_map {
+  int32_t count;
+  const int32_t *vertex;     /* of the moving shape */
+  const double *points;      /* of these vertices on the sphere; 3 each */
+  orb_hierarchy **hierarchy; /* of the moving shape; one level of it has these vertices. It is taken over */
+} orb_map_level_map;
+
 /* What guides a composed map. */
 typedef struct orb_map_guide {
   orb_map_from from;
   const double *target;    /* NULL, or where each vertex of `moving` lies on the fixed shape, 3 a vertex in its space;
                               replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
-  orb_map_springs springs; /* with ORB_MAP_FROM_PINS */
+  orb_map_springs springs; /* with ORB_MAP_FROM_PINS and ORB_MAP_FROM_COPY */
+  orb_map_level_map copy;  /* with ORB_MAP_FROM_COPY */
 } orb_map_guide;
 
 #endif

@@ -80,6 +80,15 @@ typedef struct orb_map_params {
     double pull_fall; /* and its factor from level to level */
   } level;
 
+  /* Decimated copies, which are aligned in place of large shapes. */
+  struct {
+    int32_t size;  /* vertices of a copy: on fewer, limbs with few triangles lose their shape */
+    int32_t large; /* vertices above which the later shapes are copied, and a first shape does not move. Below, the
+                      whole shape costs less than a copy and its lift */
+    int32_t rough; /* vertices above which the lift does not loosen its levels: that takes as long as all sweeps, and
+                      brings less the finer a level is */
+  } copies;
+
   /* From targets that are given. */
   struct {
     int work;        /* least that each step after the first has, as work.all: a start that is given up takes some */

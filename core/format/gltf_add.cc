@@ -1,0 +1,318 @@
+#include "format/gltf_add.h"
+
+#include <cstdio>
+#include <map>
+#include <set>
+
+#include "format/gltf_blocks.hh"
+#include "format/gltf_edit.hh"
+#include "format/gltf_parse.hh"
+#include "format/gltf_skeleton.hh"
+
+extern "C" {
+#include "format/gltf_document.h"
+}
+
+namespace gltf {
+
+namespace {
+
+const char *const VARIANTS = "KHR_materials_variants";
+
+struct Adder {
+  orb_context *ctx;
+  cJSON *doc;
+  const orb_additions &more;
+  Editor editor;
+  std::set<size_t> meshes;   /* those on the surface */
+  std::vector<Block> blocks; /* of these meshes */
+
+  Adder(orb_context *context, const Document &document, Bytes first, const orb_additions &additions)
+      : ctx(context), doc(document.root()), more(additions), editor(context, document.root(), first) {
+    const std::vector<Block> all = blocks_of(doc);
+    for (const Block &block : all) {
+      bool is_copy = block.first + static_cast<int64_t>(block.count) > more.vertex_count; /* of a mesh shown twice */
+      for (size_t i = 0; i < block.count && !is_copy; i++) {
+        if (more.on_surface[block.first + static_cast<int64_t>(i)] >= 0) {
+          meshes.insert(block.mesh);
+          break;
+        }
+      }
+    }
+    for (const Block &block : all) {
+      if (meshes.count(block.mesh) && block.first + static_cast<int64_t>(block.count) <= more.vertex_count) {
+        blocks.push_back(block);
+      }
+    }
+  }
+
+  static cJSON *attributes_of(const Block &block) { return editable(member(block.primitive, "attributes")); }
+
+  Floats floats_of(const Block &block, const float *values, size_t width) const {
+    Floats out{Charged<float>(ctx)};
+    const float *from = values + width * static_cast<size_t>(block.first);
+    out.assign(from, from + width * block.count);
+    return out;
+  }
+
+  /* Sets of one primitive must be numbered from 0 without gaps: what it lacks below `number` gets white or zeros. */
+  void fill_below(const Block &block, const std::string &prefix, int32_t number, size_t width) {
+    int64_t same = NONE;
+    for (int32_t n = 0; n < number; n++) {
+      std::string name = prefix + std::to_string(n);
+      if (!member(attributes_of(block), name.c_str())) {
+        Floats plain{Charged<float>(ctx)};
+        plain.assign(width * block.count, width == 4 ? 1.0f : 0.0f);
+        same = same == NONE ? editor.add(plain, width, true, false) : same;
+        set(attributes_of(block), name.c_str(), static_cast<double>(same));
+      }
+    }
+  }
+
+  void add_set(orb_added_set *added) {
+    const std::string prefix = added->width == 4 ? "COLOR_" : "TEXCOORD_";
+    const size_t width = static_cast<size_t>(added->width);
+    int32_t number = 0;
+    for (const Block &block : blocks) {
+      while (member(attributes_of(block), (prefix + std::to_string(number)).c_str())) {
+        number++;
+      }
+    }
+    for (const Block &block : blocks) {
+      fill_below(block, prefix, number, width);
+      int64_t accessor = editor.add(floats_of(block, added->values, width), width, true, false);
+      set(attributes_of(block), (prefix + std::to_string(number)).c_str(), static_cast<double>(accessor));
+    }
+    added->number = number;
+  }
+
+  void add_weights(const Block &block) {
+    static const char *const names[] = {"JOINTS_0", "WEIGHTS_0"};
+    const size_t from = 4 * static_cast<size_t>(block.first), count = 4 * block.count;
+    for (const char *name : names) {
+      if (member(attributes_of(block), name)) {
+        refuse_skin();
+      }
+    }
+    int64_t joints = NONE;
+    if (more.skin.joint_count <= 256) {
+      std::vector<unsigned char, Charged<unsigned char>> bytes{Charged<unsigned char>(ctx)};
+      for (size_t i = 0; i < count; i++) {
+        bytes.push_back(static_cast<unsigned char>(more.skin.joints[from + i]));
+      }
+      joints = editor.add_list(bytes.data(), count, ORB_GLTF_UBYTE, block.count, "VEC4", true);
+    } else {
+      joints = editor.add_list(more.skin.joints + from, 2 * count, ORB_GLTF_USHORT, block.count, "VEC4", true);
+    }
+    set(attributes_of(block), names[0], static_cast<double>(joints));
+    int64_t weights = editor.add(floats_of(block, more.skin.weights, 4), 4, true, false);
+    set(attributes_of(block), names[1], static_cast<double>(weights));
+  }
+
+  [[noreturn]] static void refuse_skin() {
+    throw Fault{ORB_E_BAD_OPTION,
+                "The document of the first shape has a skin already, and a mesh can have one. Leave \"skin\" of "
+                "\"transfer\" out, or use another method than 'template'."};
+  }
+
+  void add_skin() {
+    for (const Block &block : blocks) {
+      if (std::memcmp(block.matrix.m, blocks[0].matrix.m, sizeof block.matrix.m) != 0) {
+        throw Fault{
+            ORB_E_BAD_OPTION,
+            "The meshes of the first shape stand under nodes with different transforms, which one skeleton does "
+            "not fit. Leave \"skin\" of \"transfer\" out, or use another method than 'template'."};
+      }
+      add_weights(block);
+    }
+    int64_t skin = copy_skin(ctx, doc, &editor, more.skin, blocks[0].matrix);
+    for (const cJSON *node : array_of(doc, "nodes")) {
+      if (index_of(node, "mesh") != NONE && meshes.count(static_cast<size_t>(index_of(node, "mesh")))) {
+        if (index_of(node, "skin") != NONE) {
+          refuse_skin();
+        }
+        set(editable(node), "skin", static_cast<double>(skin));
+      }
+    }
+  }
+
+  void whiten() {
+    for (const cJSON *material : array_of(doc, "materials")) {
+      cJSON *surface = editable(member(material, "pbrMetallicRoughness"));
+      if (surface) {
+        cJSON *tone = made(cJSON_CreateArray());
+        set(surface, "baseColorFactor", tone);
+        for (int k = 0; k < 4; k++) {
+          append(tone, cJSON_CreateNumber(1));
+        }
+      }
+    }
+  }
+
+  cJSON *object_in(cJSON *object, const char *key) {
+    if (!member(object, key)) {
+      set(object, key, made(cJSON_CreateObject()));
+    }
+    if (!cJSON_IsObject(member(object, key))) {
+      malformed(std::string("The glTF member \"") + key + "\" is not an object.");
+    }
+    return editable(member(object, key));
+  }
+
+  void use_extension(const char *name) {
+    for (const cJSON *used : array_of(doc, "extensionsUsed")) {
+      if (cJSON_IsString(used) && std::strcmp(used->valuestring, name) == 0) {
+        return;
+      }
+    }
+    append(array_in(doc, "extensionsUsed"), cJSON_CreateString(name));
+  }
+
+  /* Adds a variant to the document's list; returns its number, and its name made unique. */
+  int64_t name_variant(cJSON *list, std::string *name) {
+    std::set<std::string> taken;
+    for (const cJSON *variant = list->child; variant; variant = variant->next) {
+      taken.insert(text_of(variant, "name"));
+    }
+    std::string plain = *name;
+    for (int again = 2; taken.count(*name); again++) {
+      *name = plain + " (" + std::to_string(again) + ")";
+    }
+    cJSON *variant = made(cJSON_CreateObject());
+    int64_t number = append(list, variant);
+    set(variant, "name", cJSON_CreateString(name->c_str()));
+    return number;
+  }
+
+  int64_t add_material(const orb_added_variant &variant, const std::string &name, const orb_added_image &image,
+                       int64_t texcoord) {
+    int64_t view = editor.add_view(image.png, image.size, 0);
+    cJSON *picture = made(cJSON_CreateObject()), *texture = made(cJSON_CreateObject());
+    int64_t source = append(array_in(doc, "images"), picture);
+    set(picture, "name", cJSON_CreateString(name.c_str()));
+    set(picture, "bufferView", static_cast<double>(view));
+    set(picture, "mimeType", cJSON_CreateString("image/png"));
+    int64_t number = append(array_in(doc, "textures"), texture);
+    set(texture, "source", static_cast<double>(source));
+    cJSON *material = made(cJSON_CreateObject());
+    int64_t index = append(array_in(doc, "materials"), material);
+    set(material, "name", cJSON_CreateString(name.c_str()));
+    cJSON *surface = object_in(material, "pbrMetallicRoughness"), *used = object_in(surface, "baseColorTexture");
+    set(used, "index", static_cast<double>(number));
+    if (texcoord > 0) {
+      set(used, "texCoord", static_cast<double>(texcoord));
+    }
+    set(surface, "metallicFactor", variant.metallic);
+    set(surface, "roughnessFactor", variant.roughness);
+    if (variant.is_blended) {
+      set(material, "alphaMode", cJSON_CreateString("BLEND"));
+    }
+    if (variant.is_double_sided) {
+      set(material, "doubleSided", cJSON_CreateBool(1));
+    }
+    return index;
+  }
+
+  static void add_mapping(cJSON *mappings, int64_t material, int64_t variant) {
+    cJSON *mapping = made(cJSON_CreateObject());
+    append(mappings, mapping);
+    set(mapping, "material", static_cast<double>(material));
+    append(array_in(mapping, "variants"), cJSON_CreateNumber(static_cast<double>(variant)));
+  }
+
+  cJSON *mappings_of(const Block &block) {
+    cJSON *extensions = object_in(editable(block.primitive), "extensions");
+    return array_in(object_in(extensions, VARIANTS), "mappings");
+  }
+
+  void add_variant(orb_added_variant *variant, cJSON *list) {
+    std::string name = variant->name;
+    const List materials = array_of(doc, "materials"); /* before it gets more */
+    int64_t number = name_variant(list, &name);
+    std::snprintf(variant->name, sizeof variant->name, "%s", name.c_str());
+    for (int32_t i = 0; i < variant->image_count; i++) {
+      const orb_added_image &image = variant->images[i];
+      std::map<int64_t, int64_t> made_for; /* by the set of texture coordinates */
+      for (const Block &block : blocks) {
+        if (whole(block.primitive, "material", NONE) != image.material) {
+          continue;
+        }
+        int64_t texcoord = painted_set(materials, block.primitive);
+        if (!member(attributes_of(block), ("TEXCOORD_" + std::to_string(texcoord)).c_str())) {
+          continue;
+        }
+        if (!made_for.count(texcoord)) {
+          made_for[texcoord] = add_material(*variant, name, image, texcoord);
+        }
+        add_mapping(mappings_of(block), made_for[texcoord], number);
+      }
+    }
+  }
+
+  void add_variants() {
+    use_extension(VARIANTS);
+    cJSON *extension = object_in(object_in(doc, "extensions"), VARIANTS);
+    bool is_first = !member(extension, "variants");
+    cJSON *list = array_in(extension, "variants");
+    if (is_first) {
+      std::string name = more.own_name;
+      int64_t own = name_variant(list, &name);
+      for (const Block &block : blocks) {
+        int64_t material = whole(block.primitive, "material", NONE);
+        if (material != NONE) {
+          add_mapping(mappings_of(block), material, own);
+        }
+      }
+    }
+    for (int32_t i = 0; i < more.variant_count; i++) {
+      add_variant(&more.variants[i], list);
+    }
+  }
+
+  /* Says that the asset has more than orb_asset_write() wrote, so that no profile is made of it. */
+  void mark() {
+    const List all = array_of(doc, "meshes");
+    for (size_t number : meshes) {
+      cJSON *mesh = editable(element(all, static_cast<int64_t>(number), "mesh"));
+      if (!member(mesh, "extras")) {
+        set(mesh, "extras", made(cJSON_CreateObject()));
+      }
+      cJSON *extras = editable(member(mesh, "extras"));
+      if (cJSON_IsObject(extras)) {
+        set(extras, "transferred", cJSON_CreateBool(1));
+      }
+    }
+  }
+
+  void add(orb_buffer *out) {
+    for (int32_t i = 0; i < more.set_count; i++) {
+      add_set(&more.sets[i]);
+      if (more.whiten && more.sets[i].width == 4 && more.sets[i].number == 0) {
+        whiten();
+      }
+    }
+    if (more.skin.bytes && !blocks.empty()) {
+      add_skin();
+    }
+    if (more.variant_count > 0) {
+      add_variants();
+    }
+    mark();
+    editor.write(out);
+  }
+};
+
+}  // namespace
+
+}  // namespace gltf
+
+extern "C" orb_status orb_gltf_add(orb_context *ctx, const unsigned char *bytes, size_t size,
+                                   const orb_additions *additions, orb_buffer *out) {
+  return gltf::guarded(ctx, size, [&] {
+    gltf::Document document(ctx, bytes, size, true);
+    gltf::Buffers buffers(ctx);
+    buffers.load(document.root(), document.chunk(), size);
+    gltf::Adder adder(ctx, document, buffers.buffer(0), *additions);
+    adder.add(out);
+  });
+}

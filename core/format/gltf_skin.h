@@ -1,0 +1,18 @@
+/* A skin that an asset gets from another document. */
+#ifndef ORB_FORMAT_GLTF_SKIN_H
+#define ORB_FORMAT_GLTF_SKIN_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* A skin of a document, and which of its joints move the vertices. */
+typedef struct orb_added_skin {
+  const unsigned char *bytes; /* the document; NULL: no skin is added */
+  size_t size;
+  int32_t skin, joint_count;
+  double place[16], moved[16]; /* from its meshes to its scene, and from there to the asset; column-major */
+  const uint16_t *joints;      /* 4 a vertex of all triangle primitives */
+  const float *weights;        /* likewise; the sum is 1 */
+} orb_added_skin;
+
+#endif

@@ -1,0 +1,11 @@
+/* The frames of morph targets that are no shapes. */
+#ifndef ORB_TRANSFER_TARGETS_H
+#define ORB_TRANSFER_TARGETS_H
+
+#include "transfer/draft.h"
+
+/* Fills the frames after the in-betweens: positions, and where the draft has them, normals, which turn with the smooth
+ * normal of the surface, and colours, which stay. */
+ORB_MUST_CHECK orb_status orb_draft_targets(orb_context *ctx, orb_draft *draft);
+
+#endif

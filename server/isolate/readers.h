@@ -1,0 +1,43 @@
+/* Processes that check small files one after another, each those of one tenant: to start a process costs more than to
+ * check a small file.
+ *
+ * Such a process is confined like any other, with the memory of the largest file that it may get, which it holds as
+ * long as it lives. It ends when no file of its tenant comes for a moment, after READER_FILES files or READER_WORK_MS
+ * of work, and as soon as others lack memory. It never gets a file of another tenant. If it dies after it has read
+ * other files, the cause may be one of those: the check is to be repeated in a process of its own.
+ */
+#ifndef ORB_ISOLATE_READERS_H
+#define ORB_ISOLATE_READERS_H
+
+#include "budget.h"
+#include "isolate/isolate.h"
+
+enum {
+  READER_BYTES = 1 << 20, /* larger files take so long that a process of their own adds little */
+  READER_FILES = 100,     /* a process adds a hundredth of its cost to each */
+  READER_WORK_MS = 1000   /* beside the limit of a single check on processor time */
+};
+
+typedef struct reader {
+  isolated process;
+  int files;      /* that it has read before this one */
+  int64_t memory; /* to which it is limited beside a file */
+  /* private */
+  int state;
+  char *tenant;
+  budget_part part;
+  int64_t began, work_ms; /* of its present file; of all files before */
+  unsigned shortages;
+} reader;
+
+int readers_start(memory_budget *memory); /* 0: no thread; does nothing where isolation is off */
+void readers_stop(void);
+
+/* A process for a file of this tenant, or NULL: the check gets a process of its own. memory: that the check needs. */
+reader *reader_take(const char *tenant, budget_part part, int64_t bytes, int64_t memory, orb_context *ctx);
+/* Its check has ended, with an answer. */
+void reader_give(reader *r);
+/* Ends it and returns its status, as isolate_close(). */
+int reader_end(reader *r);
+
+#endif

@@ -1,0 +1,27 @@
+/* Taking a job for a worker. */
+#include "queue/internal.h"
+#include "queue/shared.h"
+
+int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
+  if (q->shared) {
+    return shared_take(q, lane, out, threads);
+  }
+  pthread_mutex_lock(&q->lock);
+  job *j = NULL;
+  while (!q->stopping && !((j = schedule_choose(q, lane)) && schedule_take_memory(q, lane, j))) {
+    pthread_cond_wait(lane == QUEUE_FETCHES ? &q->fetch_work : &q->work, &q->lock);
+  }
+  if (j && !q->stopping) {
+    int64_t now = orb_clock_ms();
+    int wanted = q->running - q->fetching + 1 + schedule_beside(q, j, now);
+    int share = wanted < q->options.workers ? wanted : q->options.workers;
+    *threads = q->options.cores / share > 0 ? q->options.cores / share : 1;
+    schedule_enter(q, lane, j, now);
+    *threads = j->is_guest ? 1 : *threads;
+    *out = j;
+  } else {
+    j = NULL;
+  }
+  pthread_mutex_unlock(&q->lock);
+  return j != NULL;
+}

@@ -1,0 +1,356 @@
+// Several nodes on one catalogue in PostgreSQL and one bucket of S3: what one accepts, others run and show; what happens
+// to jobs when a node is killed or paused, when PostgreSQL or S3 goes away, and when connections are cut.
+// Runs under tests/tools/with_postgresql.sh and with_s3.sh.
+//
+// ORB_ROUNDS (8) is the number of rounds of chaos, ORB_SEED chooses them.
+import assert from 'node:assert/strict';
+import { execFileSync, spawnSync } from 'node:child_process';
+import { createHash } from 'node:crypto';
+import { mkdtemp, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import test from 'node:test';
+import { assertProblem, Daemon, endless, patience, samples, until } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const program = process.env.ORB_DAEMON; // that starts with a catalogue and objects of its own
+assert.ok(
+  program && process.env.ORB_POSTGRESQL && process.env.ORB_S3,
+  'to be run by with_postgresql.sh and with_s3.sh',
+);
+const rounds = Number(process.env.ORB_ROUNDS ?? 8);
+const LEASE = 3; // seconds; a busy machine must not pause a node for so long
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const postgresql = (what) => execFileSync(process.env.ORB_POSTGRESQL_DO, [what], { stdio: 'ignore' });
+let s3 = Number(process.env.ORB_S3_PID);
+
+let seed = Number(process.env.ORB_SEED ?? 1);
+function random(below) {
+  seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
+  return Math.floor((seed / 2 ** 32) * below);
+}
+
+let meshes = 0;
+function newMesh() {
+  const n = ++meshes;
+  return shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y, z + 0.001 * n]));
+}
+
+/** Nodes that share a catalogue and a bucket. */
+class Cluster {
+  nodes = [];
+
+  constructor(t) {
+    const name = `cluster${process.pid}-${++Cluster.count}`;
+    this.catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
+    this.objects = `s3://objects/${name}?endpoint=${process.env.ORB_S3}`;
+    t.after(() => this.end());
+  }
+
+  async node(...more) {
+    const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+    const shared = ['--catalogue', this.catalogue, '--objects', this.objects, '--lease-seconds', `${LEASE}`];
+    const made = new Daemon(data, [...shared, '--workers', '2', '--log-format', 'text', ...more], {});
+    made.program = [program];
+    this.nodes.push(made);
+    return made.start();
+  }
+
+  async end() {
+    for (const node of this.nodes) {
+      node.child?.kill('SIGCONT');
+      const killer = setTimeout(() => node.child?.kill('SIGKILL'), 60_000 * patience);
+      const { code, signal } = await node.stop();
+      clearTimeout(killer);
+      await rm(node.data, { recursive: true, force: true });
+      assert.ok(node.killed || code === 0, `a node ended with ${code ?? signal}\n${node.log}`);
+    }
+  }
+
+  sql(text) {
+    const set = `SET search_path=${/search_path%3D(\w+)/.exec(this.catalogue)[1]};`;
+    return execFileSync('psql', ['-X', '-qAt', '-v', 'ON_ERROR_STOP=1', '-d', process.env.ORB_POSTGRESQL], {
+      input: set + text,
+      encoding: 'utf8',
+    }).trim();
+  }
+
+  /** The node that runs a job. */
+  async runner(job) {
+    const name = await until(
+      () => this.sql(`SELECT node FROM job WHERE id='${job.id}' AND state=1`),
+      'the job runs',
+      60,
+    );
+    return this.nodes.find((node) => node.log.includes(`node ${name}`));
+  }
+
+  cut() {
+    this.sql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name='orbmorphd'");
+  }
+
+  /** Every row has its object, and every object its row, but for what a node that died had just uploaded. */
+  async check() {
+    const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+    const args = ['--check-data', '--data', data, '--catalogue', this.catalogue, '--objects', this.objects];
+    const found = spawnSync(program, args, { encoding: 'utf8', timeout: 120_000 * patience });
+    await rm(data, { recursive: true });
+    assert.equal(found.status, 0, found.stdout + found.stderr);
+    return found.stdout;
+  }
+}
+Cluster.count = 0;
+
+/** The events of a stream after a number, until `enough` is true of one. */
+async function eventsOf(node, job, after, enough) {
+  const over = new AbortController();
+  const response = await fetch(new URL(`${job.url}/events`, node.url), {
+    headers: after ? { 'last-event-id': `${after}` } : {},
+    signal: over.signal,
+  });
+  assert.equal(response.status, 200);
+  const events = [];
+  let text = '';
+  for await (const part of response.body.pipeThrough(new TextDecoderStream())) {
+    text += part;
+    for (let end; (end = text.indexOf('\n\n')) >= 0; text = text.slice(end + 2)) {
+      const found = /^id: (\d+)\nevent: (\w+)\ndata: (.*)$/m.exec(text.slice(0, end));
+      if (!found) continue;
+      events.push({ number: Number(found[1]), type: found[2], job: JSON.parse(found[3]) });
+      if (enough(events.at(-1))) {
+        over.abort();
+        return events;
+      }
+    }
+  }
+  return events;
+}
+
+/** The last stage of a job is remembered only by nodes that watched it. */
+function sameEnd(one, other) {
+  assert.deepEqual({ ...one, stage: null }, { ...other, stage: null });
+}
+
+const slowJob = async (node, scale = 1) =>
+  (
+    await node.post('/v1/embeddings', {
+      mesh: (await node.upload(shapes.obj(shapes.ball(4, ([x, y, z]) => [x * scale, y, z])))).json.id,
+      ...endless,
+    })
+  ).json;
+
+test('what one node accepts, others run and show', async (t) => {
+  const c = new Cluster(t);
+  const a = await c.node('--role', 'serve');
+  const b = await c.node('--role', 'serve');
+  const w = await c.node('--role', 'work');
+  assert.match(w.out, /works without a port/);
+  const { id } = await a.mesh(path.join(samples, 'dog.obj'));
+  assert.equal((await b.get(`/v1/meshes/${id}`)).status, 200);
+  const reply = await a.post('/v1/embeddings', { mesh: id });
+  assert.equal(reply.status, 202);
+  const twice = await b.post('/v1/embeddings', { mesh: id });
+  if (twice.status === 202) assert.equal(twice.json.id, reply.json.id); // one flight a key
+  const [here, there] = await Promise.all([a.ended(reply.json), b.ended(reply.json)]);
+  assert.equal(here.state, 'succeeded');
+  sameEnd(there, here);
+  const spheres = await Promise.all([a, b].map((node) => node.get(`${here.result}/sphere.ply`)));
+  assert.equal(spheres[0].status, 200);
+  assert.ok(spheres[0].bytes.equals(spheres[1].bytes));
+
+  // A supermesh waits for an embedding that it lacks; its events come from any node, and go on where they ended.
+  const other = await b.upload(newMesh());
+  const merged = await b.post('/v1/supermeshes', { shapes: [{ mesh: id }, { mesh: other.json.id }] });
+  assert.equal(merged.status, 202, merged.bytes.toString());
+  const first = await eventsOf(a, merged.json, 0, (event) => event.type === 'progress');
+  const rest = await eventsOf(b, merged.json, first.at(-1).number, () => false);
+  assert.ok(rest.every((event, i) => event.number > (i ? rest[i - 1] : first.at(-1)).number));
+  assert.equal(rest.at(-1).type, 'succeeded');
+  sameEnd((await a.get(merged.json.url)).json, rest.at(-1).job);
+  assert.equal(
+    (await a.get(`${merged.json.url}/events`, { headers: { 'last-event-id': `${rest.at(-1).number}` } })).status,
+    204,
+  );
+
+  // Deleted on one node, it is gone on all.
+  const gone = rest.at(-1).job.result;
+  assert.equal((await a.get(gone)).status, 200);
+  assert.equal((await b.delete(gone)).status, 204);
+  await until(async () => (await a.get(gone)).status === 404, 'it is gone', 10);
+  assert.match(await c.check(), / 0 wrong, 0 objects without a row/);
+});
+
+test('any node cancels a job; a node that is killed loses its jobs to others', async (t) => {
+  const c = new Cluster(t);
+  const a = await c.node('--role', 'serve');
+  const b = await c.node('--role', 'serve');
+  const first = await c.node('--role', 'work', '--workers', '1');
+  const jobs = [await slowJob(a), await slowJob(a, 1.1)];
+  const running = await until(async () => {
+    const all = await Promise.all(jobs.map(async (job) => (await b.get(job.url)).json));
+    return all.find((job) => job.state === 'running');
+  }, 'one runs');
+  const queued = jobs.find((job) => job.id !== running.id);
+  assert.equal((await b.delete(queued.url)).json.state, 'cancelled');
+  await until(async () => (await a.get(queued.url)).json.state === 'cancelled', 'the other node knows', 10);
+
+  first.killed = true;
+  await first.stop('SIGKILL');
+  const second = await c.node('--role', 'work', '--workers', '1');
+  const again = await until(
+    async () => {
+      const { json } = await a.get(running.url);
+      return json.state === 'running' && json.attempt > running.attempt && json;
+    },
+    'the other node runs it',
+    60,
+  );
+  assert.equal(await c.runner(again), second);
+  assert.equal(c.sql(`SELECT suspect FROM job WHERE id='${again.id}'`), '1');
+  assert.equal((await b.delete(running.url)).json.state, 'cancelled');
+  assert.equal((await a.delete(running.url)).json.state, 'cancelled'); // again, on another node
+});
+
+test('a node that was paused beyond its lease drops what it made; others have made it', async (t) => {
+  const c = new Cluster(t);
+  const serve = await c.node('--role', 'serve');
+  const works = [await c.node('--role', 'work'), await c.node('--role', 'work')];
+  const ids = [];
+  for (const name of ['dog.obj', 'giraffe.off']) ids.push((await serve.mesh(path.join(samples, name))).id);
+  for (const mesh of ids) await serve.made('/v1/embeddings', { mesh });
+  const { json } = await serve.post('/v1/supermeshes', { shapes: ids.map((mesh) => ({ mesh })) });
+  const paused = await c.runner(json);
+  paused.child.kill('SIGSTOP');
+  const done = await serve.ended(json);
+  assert.equal(done.state, 'succeeded');
+  assert.ok(done.attempt >= 2, `${done.attempt}`);
+  const asset = await serve.get(`${done.result}/asset.glb`);
+  assert.equal(asset.status, 200);
+  paused.child.kill('SIGCONT');
+  await until(() => /has lost it/.test(paused.log), 'it finds that it has lost the job', 120);
+  sameEnd((await serve.get(json.url)).json, done);
+  const ends = c.sql(
+    `SELECT count(*) FROM event WHERE job='${json.id}' AND type IN ('succeeded','failed','cancelled')`,
+  );
+  assert.equal(ends, '1');
+  await serve.made('/v1/embeddings', { mesh: (await serve.upload(newMesh())).json.id });
+  assert.equal(works.length, 2);
+  await c.check();
+});
+
+test('while PostgreSQL is away, requests get 503 and running jobs lose nothing', async (t) => {
+  const c = new Cluster(t);
+  const a = await c.node();
+  const ids = [];
+  for (const name of ['dog.obj', 'giraffe.off']) ids.push((await a.mesh(path.join(samples, name))).id);
+  for (const mesh of ids) await a.made('/v1/embeddings', { mesh });
+  const { json } = await a.post('/v1/supermeshes', { shapes: ids.map((mesh) => ({ mesh })) });
+  await c.runner(json);
+  postgresql('stop');
+  const reply = await a.upload(newMesh());
+  assertProblem(reply, 503, 'unavailable');
+  assert.ok(Number(reply.headers.get('retry-after')) > 0);
+  const ready = await until(async () => {
+    const found = await a.get('/readyz');
+    return found.status === 503 && found;
+  }, 'it is not ready');
+  assert.match(ready.json.detail, /PostgreSQL/);
+  await until(() => /supermesh job (done|did not succeed)/.test(a.log), 'the job has run', 300);
+  postgresql('start');
+  await until(async () => (await a.get('/readyz')).status === 200, 'it is ready', 60);
+  const done = await a.ended(json);
+  assert.equal(done.state, 'succeeded');
+  assert.equal(done.attempt, 1);
+  c.cut();
+  assert.equal((await a.upload(newMesh())).status, 201);
+  await c.check();
+});
+
+/** What clients of the cluster were promised. */
+class Ledger {
+  jobs = new Map(); // url → {job, mesh}
+  hashes = new Map(); // url of a sphere → its hash
+
+  constructor(cluster) {
+    this.cluster = cluster;
+  }
+
+  async submit(node) {
+    const mesh = await node.upload(newMesh());
+    if (mesh.status !== 201) return;
+    const reply = await node.post('/v1/embeddings', { mesh: mesh.json.id });
+    if (reply.status === 202) this.jobs.set(reply.json.url, reply.json);
+  }
+
+  /** Clients give up on an error, and try the next node. */
+  async client(nodes, until) {
+    while (Date.now() < until) await this.submit(nodes[random(nodes.length)]).catch(() => sleep(20));
+  }
+
+  async settle(nodes) {
+    for (const job of this.jobs.values()) {
+      const done = await nodes[random(nodes.length)].ended(job, { seconds: 60 });
+      assert.equal(done.state, 'succeeded', JSON.stringify(done));
+      const url = `${done.result}/sphere.ply`;
+      const [one, other] = await Promise.all(nodes.slice(0, 2).map((node) => node.get(url)));
+      assert.equal(one.status, 200, `${url}: ${one.bytes.toString().slice(0, 300)}`);
+      const hash = createHash('sha256').update(one.bytes).digest('hex');
+      assert.equal(createHash('sha256').update(other.bytes).digest('hex'), hash);
+      assert.equal(this.hashes.get(url) ?? hash, hash, 'the bytes have changed');
+      this.hashes.set(url, hash);
+    }
+  }
+}
+
+test('no chaos loses an accepted job, or changes what it made', async (t) => {
+  const c = new Cluster(t);
+  const serve = [await c.node('--workers', '1'), await c.node('--workers', '1')];
+  const work = await c.node('--role', 'work', '--workers', '1');
+  const all = [...serve, work];
+  const ledger = new Ledger(c);
+  const actions = {
+    async kill(node) {
+      node.killed = true;
+      await node.stop('SIGKILL');
+      await node.start();
+    },
+    async pause(node) {
+      node.child.kill('SIGSTOP');
+      await sleep(1000 * LEASE + 500);
+      node.child.kill('SIGCONT');
+    },
+    async cut() {
+      c.cut();
+    },
+    async database() {
+      postgresql('stop');
+      await sleep(300);
+      postgresql('start');
+    },
+    async objects() {
+      process.kill(s3, 'SIGKILL');
+      await sleep(300);
+      s3 = Number(execFileSync(process.env.ORB_S3_START, { encoding: 'utf8' }));
+      await until(() => fetch(process.env.ORB_S3).catch(() => 0), 'S3 is back', 60);
+    },
+  };
+  const order = Object.keys(actions);
+  for (let round = 0; round < rounds; round++) {
+    const name = order[round % order.length];
+    const clients = [1, 2].map(() => ledger.client(serve, Date.now() + 600));
+    await sleep(random(500));
+    await actions[name](all[random(all.length)]);
+    await Promise.all(clients);
+    if (rounds > 20) t.diagnostic(`round ${round}: ${name}, ${ledger.jobs.size} jobs`);
+  }
+  await until(async () => (await serve[0].get('/readyz')).status === 200, 'a node is ready', 60);
+  await until(async () => (await serve[1].get('/readyz')).status === 200, 'the other is ready', 60);
+  await ledger.settle(serve);
+  assert.ok(ledger.jobs.size >= rounds, `${ledger.jobs.size} jobs`);
+  const twice = c.sql(
+    "SELECT count(*) FROM (SELECT job FROM event WHERE type IN ('succeeded','failed','cancelled') GROUP BY job HAVING count(*)>1) AS x",
+  );
+  assert.equal(twice, '0');
+  assert.equal(c.sql('SELECT count(*) FROM job WHERE state<2'), '0');
+  await c.check();
+});

@@ -1,0 +1,73 @@
+// A proxy before an S3 server that answers some requests as a server in trouble does.
+import http from 'node:http';
+
+/** The next request is sent on. */
+export const pass = 'pass';
+/** 503 SlowDown, without asking the server. */
+export const busy = 'busy';
+/** The server does what is asked, and its answer is lost. */
+export const lost = 'lost';
+/** The same, and its answer is 500. */
+export const late = 'late';
+/** The connection ends within the body of the answer. */
+export const half = 'half';
+/** Half of the body, as a whole answer. */
+export const short = 'short';
+/** One bit of the body is another. */
+export const flipped = 'flipped';
+
+function answer(how, from, body, response) {
+  const headers = { ...from.headers };
+  const part = body.subarray(0, body.length >> 1);
+  if (how === lost) return response.destroy();
+  if (how === late) return response.writeHead(500).end();
+  if (how === short && part.length) {
+    headers['content-length'] = part.length;
+    response.writeHead(from.statusCode, headers).end(part);
+  } else if (how === half && part.length) {
+    response.writeHead(from.statusCode, headers).write(part, () => response.destroy());
+  } else {
+    if (how === flipped && part.length) body[part.length] ^= 4;
+    response.writeHead(from.statusCode, headers).end(body);
+  }
+}
+
+/**
+ * Starts it before the server at `url`, until the test ends. `decide` chooses by {method, path, query, tries}, where tries
+ * counts the requests of this method to this path and query, from 1.
+ */
+export async function s3Proxy(t, url, decide) {
+  const proxy = { decide, seen: [], tries: new Map() };
+  const server = http.createServer((request, response) => {
+    const [path, query = ''] = request.url.split('?');
+    const key = `${request.method} ${request.url}`;
+    proxy.tries.set(key, (proxy.tries.get(key) ?? 0) + 1);
+    const asked = { method: request.method, path, query, tries: proxy.tries.get(key) };
+    const how = proxy.decide(asked) ?? pass;
+    proxy.seen.push({ ...asked, how });
+    if (how === busy) {
+      request.resume();
+      request.on('end', () =>
+        response.writeHead(503, { 'content-type': 'application/xml' }).end('<Error><Code>SlowDown</Code></Error>'),
+      );
+      return;
+    }
+    const { hostname, port } = new URL(url);
+    // The headers as they came: the signature is over them.
+    const to = http.request({ hostname, port, method: request.method, path: request.url, headers: request.headers });
+    request.pipe(to);
+    to.on('error', () => response.destroy());
+    to.on('response', async (from) => {
+      const chunks = [];
+      for await (const chunk of from) chunks.push(chunk);
+      answer(how, from, Buffer.concat(chunks), response);
+    });
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  t.after(() => {
+    server.closeAllConnections();
+    return new Promise((done) => server.close(done));
+  });
+  proxy.url = `http://127.0.0.1:${server.address().port}`;
+  return proxy;
+}

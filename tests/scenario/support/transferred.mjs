@@ -1,0 +1,40 @@
+// An asset with what "transfer" gave it.
+import assert from 'node:assert/strict';
+import validator from 'gltf-validator';
+import { parseGlb } from './glb.mjs';
+
+export const uploaded = async (d, bytes, query) => {
+  const reply = await d.upload(bytes, query);
+  assert.equal(reply.status, 201, JSON.stringify(reply.json));
+  return { mesh: reply.json.id };
+};
+
+/** The asset of a supermesh: its document, and each primitive with its values read. Fails where the validator warns. */
+export async function assetOf(d, made) {
+  const { bytes } = await d.get(made.asset);
+  const { issues } = await validator.validateBytes(new Uint8Array(bytes));
+  const bad = issues.messages.filter((m) => m.severity < 2);
+  assert.deepEqual(bad, []);
+  const { gltf, read } = parseGlb(bytes);
+  const all = gltf.meshes.flatMap((mesh) =>
+    mesh.primitives.map((primitive) => {
+      const values = Object.fromEntries(
+        Object.entries(primitive.attributes).map(([name, index]) => [name, [...read(index)]]),
+      );
+      const moves = (primitive.targets ?? []).map((target) => [...read(target.POSITION)]);
+      return { ...values, primitive, moves, indices: [...read(primitive.indices)] };
+    }),
+  );
+  return { gltf, read, all, bytes };
+}
+
+/** The place of each vertex on the shape that a target shows. */
+export const shown = ({ POSITION, moves }, target = 0) =>
+  Array.from({ length: POSITION.length / 3 }, (_, v) =>
+    [0, 1, 2].map((k) => POSITION[3 * v + k] + moves[target][3 * v + k]),
+  );
+
+export const near = (a, b, most, what) =>
+  a.forEach((x, k) => {
+    assert.ok(Math.abs(x - b[k]) < most, `${what}: ${a} is not ${b}`);
+  });

@@ -1,0 +1,111 @@
+// A match that was found without landmarks: what the studio says of it, and the other matches.
+import { test } from 'node:test';
+import assert from 'node:assert/strict';
+import { figure, obj } from '../scenario/support/shapes.mjs';
+import { browser, daemon } from './started.mjs';
+import { addFiles, button, countPixels, defaultShown, json, openPage, sample, settled, until } from './support.mjs';
+
+const said = (page) => page.getByRole('status', { name: 'How sure the match is' });
+const says = (page, pattern, what) => until(async () => pattern.test(await said(page).innerText()), what);
+const shown = (page) => page.url().match(/r=([0-9a-f]{64})/)?.[1];
+
+async function morphed(page, count) {
+  await button(page, `Morph ${count} shapes`).click();
+  await until(() => button(page, 'Pause').count(), 'the morph plays');
+  await defaultShown(page);
+  const link = await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href');
+  return json(daemon.url, `/v1/supermeshes/${link.match(/[0-9a-f]{64}/)[0]}`);
+}
+
+/** The id of the morph that a request gives. A job that takes longer than one wait answers with its own id, half as long. */
+async function idOf(request) {
+  const headers = { 'content-type': 'application/json', prefer: 'wait=60' };
+  for (;;) {
+    const { id } = await json(daemon.url, '/v1/supermeshes', {
+      method: 'POST',
+      headers,
+      body: JSON.stringify(request),
+    });
+    if (/^[0-9a-f]{64}$/.test(id)) return id;
+  }
+}
+
+test('three shapes: verdict, doubt, heat map, and the matches one after another, also after a reload', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'), sample('elephant.ply'));
+  const first = await morphed(page, 3);
+  assert.equal(first.match.verdict, 'unsure');
+  assert.deepEqual(
+    first.alternatives.map(({ shape }) => shape),
+    [2, 1],
+    'the best other match is of the third shape',
+  );
+  await says(page, /^Not sure: the \w[\w ]* of dog may be the \w[\w ]* of elephant\. Look at it/, 'the doubt in words');
+  // the other matches take the head of the dog to a limb, or front to back: none has left and right swapped
+  assert.equal(await button(page, 'Flip').count(), 0);
+  await button(page, 'Heat map').click();
+  await until(async () => (await page.getByText(/^99 % of it below/).count()) === 3, 'three are measured');
+  await settled(page);
+  for (const i of [0, 1, 2]) {
+    const pane = `.pane:nth-child(${i + 1}) .pane-view`;
+    const blue = await countPixels(page, pane, (r, g, b) => b > r + 15 && b > g && r < 70);
+    const red = await countPixels(page, pane, (r, g, b) => r > 120 && r > 2 * g && r > 1.5 * b);
+    assert.ok(blue > 500 && red > 20, `shape ${i}: ${blue} blue, ${red} red`);
+  }
+  const ids = [first.id];
+  for (const { request } of first.alternatives) ids.push(await idOf(request));
+  await button(page, 'Next match').click();
+  await says(page, /^Match 2 of 3; the first one was the best\.$/, 'the second match');
+  await until(() => shown(page) === ids[1], 'its morph');
+  await page.reload();
+  await says(page, /^Match 2 of 3; the first one was the best\.$/, 'it is the second one after a reload');
+  assert.equal(shown(page), ids[1]);
+  await button(page, 'Next match').click();
+  await says(page, /^Match 3 of 3;/, 'the third match');
+  await until(() => shown(page) === ids[2], 'its morph');
+  await button(page, 'Next match').click();
+  await says(page, /^Not sure: /, 'the first match, and its doubt');
+  await until(() => shown(page) === ids[0] && !/[#&]q=/.test(page.url()), 'its morph');
+  await done();
+});
+
+test('Flip swaps left and right and back, also after a reload', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const bodies = [figure([0.8, 1, 0.5, 0.5]), figure([1, 0.9, 0.6, 0.45], 0.7), figure([0.6, 1.2, 0.4, 0.5])];
+  const files = bodies.map((body, i) => ({
+    name: `figure${i}.obj`,
+    mimeType: 'text/plain',
+    buffer: Buffer.from(obj(body)),
+  }));
+  await addFiles(page, ...files);
+  const first = await morphed(page, 3);
+  const [other] = first.alternatives;
+  // what it takes from the left (x < 0) of the first figure lies on the right of the other one, and the other way round
+  const across = ({ point, vertex, triangle, barycentric }, { positions, triangles }) => {
+    if (point) return point[0];
+    if (vertex !== undefined) return positions[vertex][0];
+    return triangles[triangle].reduce((sum, v, k) => sum + barycentric[k] * positions[v][0], 0);
+  };
+  const sides = other.request.landmarks
+    .map(({ at }) => [across(at[0], bodies[0]), across(at[other.shape], bodies[other.shape])])
+    .filter((pair) => pair.every((x) => Math.abs(x) > 0.3));
+  assert.ok(sides.length >= 4 && sides.every(([a, b]) => a * b < 0), JSON.stringify(sides));
+  const flipped = await idOf(other.request);
+  await button(page, 'Flip').click();
+  await until(() => shown(page) === flipped, 'the flipped match');
+  await says(page, new RegExp(`^Match 2 of ${1 + first.alternatives.length};`), 'it is the second');
+  await page.reload();
+  await button(page, 'Flip').click();
+  await until(() => shown(page) === first.id, 'the first match again');
+  assert.equal(await said(page).count(), 0, 'it is sure');
+  // a link that names the job of another match: the match is what it is when the job is done
+  const headers = { 'content-type': 'application/json', prefer: 'respond-async' };
+  const body = JSON.stringify({ ...other.request, remesh: { ...other.request.remesh, tolerance: 0.0023 } });
+  const { id: job } = await json(daemon.url, '/v1/supermeshes', { method: 'POST', headers, body });
+  await until(() => !/[#&]q=/.test(page.url()), 'the URL follows');
+  const hash = `${new URL(page.url()).hash}&j=${job}&q=${first.id},0,1`;
+  const second = await openPage(browser, daemon.url, { hash });
+  await says(second.page, new RegExp(`^Match 2 of ${1 + first.alternatives.length};`), 'the second, when it is done');
+  await second.done();
+  await done();
+});

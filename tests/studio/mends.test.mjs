@@ -1,0 +1,73 @@
+// Meshes that are refused, and the buttons that mend them.
+import { test } from 'node:test';
+import assert from 'node:assert/strict';
+import { grating, obj } from '../scenario/support/shapes.mjs';
+import { browser, daemon } from './started.mjs';
+import { button, countPixels, json, openPage, settled, until } from './support.mjs';
+
+const red = (page) => countPixels(page, '.pane-view', (r, g, b) => r > 180 && g < 110 && b < 110);
+const digits = (text) => Number(text.replace(/\D/g, ''));
+
+/** Opens a mesh that is refused, and waits until its faults are drawn. */
+async function refused(page, name, surface) {
+  const file = { name: `${name}.obj`, mimeType: 'text/plain', buffer: Buffer.from(obj(surface)) };
+  await page.locator('input[type=file]').first().setInputFiles([file]);
+  await page.locator('.card.refused').waitFor();
+  await until(() => page.getByText('Shown in red on the model.').count(), 'the fault is drawn');
+  await settled(page);
+  assert.ok((await red(page)) > 20, 'red is drawn');
+}
+
+/** Waits until the mesh is taken, and checks that page and picture show the mended one. Returns it. */
+async function mended(page, name) {
+  await page.locator('.card.ready').waitFor();
+  const mesh = (await json(daemon.url, '/v1/meshes?limit=100')).meshes.find((m) => m.name === name);
+  await until(
+    async () =>
+      digits((await page.locator('.caption').innerText()).split('triangles')[0].replace(name, '')) === mesh.triangles,
+    `${mesh.triangles} triangles are shown`,
+  );
+  const [vertices, triangles] = (await page.locator('.card .facts').first().innerText()).split('·').map(digits);
+  assert.deepEqual([vertices, triangles], [mesh.vertices, mesh.triangles]);
+  assert.equal(triangles, 2 * vertices - 4, 'a sphere');
+  await settled(page);
+  assert.equal(await red(page), 0, 'no red is left');
+  return mesh;
+}
+
+/** Neutral pixels are background: the share of the middle of the picture that shows none. */
+const filled = (page) => countPixels(page, '.pane-view', (r, g, b) => r - b > 25 && r > g);
+
+test('one button closes all handles, also those that the refusal does not list', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  // bars that get wider: the 20 handles that the refusal leaves out are the longest
+  const surface = grating(12, 10, ([x, y, z]) => [x * (1 + 0.12 * x), y, z]);
+  await refused(page, 'grating', surface);
+  const alert = page.getByRole('alert');
+  assert.match(await alert.innerText(), /Genus 120\./);
+  assert.match(await page.getByRole('list', { name: 'Handles' }).innerText(), /95 more$/);
+  const before = await filled(page);
+  assert.equal(await alert.getByRole('button').count(), 1);
+  await button(page, 'Close all 120 handles').click();
+  const mesh = await mended(page, 'grating');
+  assert.equal(mesh.repairs.filter(({ kind, count }) => kind === 'close_handles' && count > 0).length, 120);
+  assert.notEqual(await filled(page), before, 'the picture is that of the mended mesh');
+  await done();
+});
+
+test('holes and handles of one mesh are mended by a button each', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const { positions, triangles } = grating(2, 2);
+  await refused(page, 'worn', { positions, triangles: triangles.slice(2) });
+  await button(page, 'Fill the holes').click();
+  await until(() => button(page, 'Close all 4 handles along the red loops').count(), 'the handles');
+  await settled(page);
+  assert.ok((await red(page)) > 20, 'their loops are drawn');
+  await button(page, 'Close all 4 handles along the red loops').click();
+  const mesh = await mended(page, 'worn');
+  assert.deepEqual(
+    ['fill_holes', 'close_handles'].map((kind) => mesh.repairs.some((r) => r.kind === kind && r.count > 0)),
+    [true, true],
+  );
+  await done();
+});

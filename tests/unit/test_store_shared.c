@@ -1,0 +1,312 @@
+/* The jobs of several nodes in PostgreSQL: claims in the order of fairness, leases, fencing, one flight a key, what
+ * jobs wait for. Two catalogues on one schema stand for two nodes. Runs under tests/tools/with_postgresql.sh. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "store/notices.h"
+#include "store/shared.h"
+
+typedef struct nodes {
+  char url[256];
+  catalogue *cat[2];
+  notices *bell[2];
+} nodes;
+
+static const char *const names[2] = {"11111111111111111111111111111111", "22222222222222222222222222222222"};
+enum { LEASE_MS = 300 };
+
+static int setup(void **state) {
+  static int count;
+  nodes *n = calloc(1, sizeof *n);
+  char command[256];
+  snprintf(command, sizeof command, "%s shared-%d-%d", getenv("ORB_NEW_CATALOGUE"), (int)getpid(), ++count);
+  FILE *out = popen(command, "r");
+  int fine = out && fgets(n->url, sizeof n->url, out);
+  if (!out || pclose(out) != 0 || !fine) {
+    return -1;
+  }
+  for (int i = 0; i < 2; i++) {
+    int fresh;
+    if (catalogue_open_shared(n->url, 1, &n->cat[i]) != STORE_OK || !(n->bell[i] = notices_open(n->url)) ||
+        !notices_connect(n->bell[i], &fresh) || !notices_renew(n->bell[i], names[i], 1, 60000)) {
+      return -1;
+    }
+  }
+  *state = n;
+  return 0;
+}
+
+static int teardown(void **state) {
+  nodes *n = *state;
+  for (int i = 0; i < 2; i++) {
+    catalogue_close(n->cat[i]);
+    notices_close(n->bell[i]);
+  }
+  free(n);
+  return 0;
+}
+
+static void fill(char *out, char digit) {
+  memset(out, digit, API_ID_SIZE - 1);
+  out[API_ID_SIZE - 1] = 0;
+}
+
+/* Submits a job whose key has this digit. */
+static submit_outcome submit(nodes *n, int node, const char *owner, char key, int priority, job_row *row) {
+  *row = (job_row){.kind = API_JOB_EMBEDDING, .listed = 1, .cost = 12, .priority = priority, .created = 1};
+  row->request = (char *)(uintptr_t) "{}";
+  fill(row->key, key);
+  api_random_id(row->id);
+  snprintf(row->owner, sizeof row->owner, "%s", owner);
+  job_submission s = {.row = row, .limit = 100};
+  assert_int_equal(catalogue_job_submit(n->cat[node], &s), STORE_OK);
+  return s.outcome;
+}
+
+static store_result claim(nodes *n, int node, job_claim *out) {
+  const claim_wish wish = {.node = names[node], .most_cost = INT64_MAX, .big = 1, .alone = 1, .fetches_most = 4};
+  store_result result = catalogue_claim_next(n->cat[node], &wish, out);
+  if (result == STORE_OK) {
+    free(out->row.request);
+    free(out->row.problem);
+    out->row.request = out->row.problem = NULL;
+  }
+  return result;
+}
+
+static store_result finish(nodes *n, int node, const job_claim *c, api_job_state state, const char *problem) {
+  const job_end end = {
+      .state = state, .problem = problem, .now = 5, .event = 5, .event_json = "{}", .owner = c->row.owner};
+  return catalogue_job_finish(n->cat[node], c->row.id, c->row.attempt, &end);
+}
+
+/* A job that fails leaves no result to be owned. */
+static void end(nodes *n, int node, const job_claim *c) {
+  assert_int_equal(finish(n, node, c, API_JOB_FAILED, "{}"), STORE_OK);
+}
+
+static void test_order(void **state) {
+  nodes *n = *state;
+  job_row rows[6];
+  job_claim c;
+  submit(n, 0, "ann", '1', 0, &rows[0]);
+  submit(n, 0, "ann", '2', 3, &rows[1]); /* more urgent */
+  submit(n, 1, "bob", '3', 0, &rows[2]);
+  submit(n, 1, "eve", '4', 8, &rows[3]); /* of a higher class */
+  const int order[] = {3, 1, 2, 0};      /* class, ann's most urgent; then bob, who had nothing yet; then ann again */
+  for (int i = 0; i < 4; i++) {
+    assert_int_equal(claim(n, i % 2, &c), STORE_OK);
+    assert_string_equal(c.row.id, rows[order[i]].id);
+    assert_int_equal(c.row.attempt, 1);
+    assert_int_equal(c.row.state, API_JOB_RUNNING);
+  }
+  assert_int_equal(claim(n, 0, &c), STORE_NOT_FOUND);
+}
+
+static void test_one_flight(void **state) {
+  nodes *n = *state;
+  job_row first, again, other;
+  job_claim a, b;
+  assert_int_equal(submit(n, 0, "ann", '1', 0, &first), SUBMIT_FRESH);
+  assert_int_equal(submit(n, 1, "ann", '1', 0, &again), SUBMIT_KNOWN);
+  assert_string_equal(again.id, first.id);
+  assert_int_equal(submit(n, 1, "bob", '1', 0, &other), SUBMIT_FRESH);
+  assert_int_equal(claim(n, 0, &a), STORE_OK);
+  assert_int_equal(claim(n, 1, &b), STORE_NOT_FOUND); /* the same key */
+  end(n, 0, &a);
+  assert_int_equal(claim(n, 1, &b), STORE_OK);
+  assert_string_equal(b.row.id, other.id);
+}
+
+static void test_limits(void **state) {
+  nodes *n = *state;
+  job_row row;
+  int64_t room = 1000;
+  submit(n, 0, "ann", '1', 0, &row);
+  row.request = (char *)(uintptr_t) "{}";
+  fill(row.key, '2');
+  job_submission s = {.row = &row, .limit = 1};
+  assert_int_equal(catalogue_job_submit(n->cat[1], &s), STORE_OK);
+  assert_int_equal(s.outcome, SUBMIT_FULL);
+  s = (job_submission){.row = &row, .limit = 9, .owner_limit = 1};
+  assert_int_equal(catalogue_job_submit(n->cat[1], &s), STORE_OK);
+  assert_int_equal(s.outcome, SUBMIT_QUOTA);
+  s = (job_submission){.row = &row, .limit = 9, .room = &room, .head = 40, .triangle = 40}; /* 40 + 12 * 40 each */
+  assert_int_equal(catalogue_job_submit(n->cat[1], &s), STORE_OK);
+  assert_int_equal(s.outcome, SUBMIT_ROOM);
+  assert_int_equal(room, 480);
+}
+
+/* What a node ran that is silent beyond its lease, another one runs; the first one can then neither end nor release it.
+ */
+static void test_lease(void **state) {
+  nodes *n = *state;
+  job_row row, got;
+  job_claim lost, taken;
+  submit(n, 0, "ann", '1', 0, &row);
+  assert_true(notices_renew(n->bell[0], names[0], 1, LEASE_MS));
+  assert_int_equal(claim(n, 0, &lost), STORE_OK);
+  assert_false(catalogue_lost_jobs(n->cat[1], LEASE_MS));
+  while (!catalogue_lost_jobs(n->cat[1], LEASE_MS)) {
+    usleep(20000);
+  }
+  catalogue_recover_lost(n->cat[1], 3, 7, "{}");
+  assert_int_equal(claim(n, 1, &taken), STORE_OK); /* after that write */
+  assert_string_equal(taken.row.id, row.id);
+  assert_int_equal(taken.row.attempt, 2);
+  assert_int_equal(taken.row.suspect, 1);
+  assert_int_equal(taken.row.crashes, 0); /* it did not run alone */
+  assert_int_equal(finish(n, 0, &lost, API_JOB_FAILED, "{\"late\":1}"), STORE_CONFLICT);
+  assert_int_equal(catalogue_job_release(n->cat[0], row.id, lost.row.attempt), STORE_CONFLICT);
+  end(n, 1, &taken);
+  assert_int_equal(catalogue_job_get(n->cat[0], row.id, &got), STORE_OK);
+  assert_string_equal(got.problem, "{}");
+  job_row_free(&got);
+}
+
+/* The third node that falls silent while the job runs alone ends it. */
+static void test_crashes(void **state) {
+  nodes *n = *state;
+  job_row row, got;
+  job_claim c;
+  submit(n, 0, "ann", '1', 0, &row);
+  for (int death = 0; death < 4; death++) {
+    assert_int_equal(claim(n, 0, &c), STORE_OK);
+    assert_int_equal(c.row.alone, death > 0);
+    assert_true(notices_renew(n->bell[0], names[0], 1, 0));
+    while (!catalogue_lost_jobs(n->cat[1], LEASE_MS)) {
+      usleep(20000);
+    }
+    catalogue_recover_lost(n->cat[1], 3, 7, "{\"crashed\":1}");
+    assert_int_equal(catalogue_job_cancel(n->cat[1], "none"), STORE_OK); /* waits for that write */
+    assert_true(notices_renew(n->bell[0], names[0], 1, 60000));
+  }
+  assert_int_equal(catalogue_job_get(n->cat[0], row.id, &got), STORE_OK);
+  assert_int_equal(got.state, API_JOB_FAILED);
+  assert_string_equal(got.problem, "{\"crashed\":1}");
+  job_row_free(&got);
+  assert_int_equal(claim(n, 0, &c), STORE_NOT_FOUND);
+}
+
+static void test_own_last_life(void **state) {
+  nodes *n = *state;
+  job_row row;
+  job_claim c;
+  submit(n, 0, "ann", '1', 0, &row);
+  submit(n, 0, "ann", '2', 0, &row);
+  assert_int_equal(claim(n, 0, &c), STORE_OK);
+  assert_int_equal(claim(n, 1, &c), STORE_OK);
+  assert_int_equal(catalogue_recover_own(n->cat[0], names[0]), STORE_OK);
+  assert_int_equal(claim(n, 1, &c), STORE_OK);
+  assert_int_equal(c.row.suspect, 0);
+  assert_int_equal(claim(n, 1, &c), STORE_NOT_FOUND); /* what the other node runs stays */
+}
+
+static int is_waiting(nodes *n, const char *id, job_mark *mark) {
+  assert_int_equal(catalogue_job_marks(n->cat[1], id, 1, mark), 1);
+  return mark->queued;
+}
+
+static void test_needs(void **state) {
+  nodes *n = *state;
+  job_row row;
+  job_claim whole, part;
+  job_mark mark;
+  char keys[1][API_ID_SIZE];
+  const char *const requests[] = {"{}"};
+  const int64_t costs[] = {5};
+  submit(n, 0, "ann", '1', 0, &row);
+  assert_int_equal(claim(n, 0, &whole), STORE_OK);
+  fill(keys[0], '2');
+  const job_needs needs = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
+  assert_int_equal(catalogue_job_wait(n->cat[0], &needs), STORE_OK);
+  assert_true(is_waiting(n, row.id, &mark));
+  assert_int_equal(mark.state, API_JOB_QUEUED);
+  assert_int_equal(mark.attempt, 0); /* that attempt does not count */
+  assert_int_equal(claim(n, 1, &part), STORE_OK);
+  assert_string_equal(part.row.key, keys[0]);
+  assert_true(is_waiting(n, row.id, &mark));
+  assert_int_equal(mark.state, API_JOB_RUNNING); /* as callers see it */
+  job_claim none;
+  assert_int_equal(claim(n, 0, &none), STORE_NOT_FOUND);
+  end(n, 1, &part);
+  assert_int_equal(claim(n, 0, &whole), STORE_OK);
+  assert_string_equal(whole.row.id, row.id);
+  assert_int_equal(whole.row.attempt, 1);
+}
+
+/* Cancelling who waits also cancels what only he needs. */
+static void test_cancel(void **state) {
+  nodes *n = *state;
+  job_row row;
+  job_claim whole, part;
+  char keys[1][API_ID_SIZE];
+  const char *const requests[] = {"{}"};
+  const int64_t costs[] = {5};
+  submit(n, 0, "ann", '1', 0, &row);
+  assert_int_equal(claim(n, 0, &whole), STORE_OK);
+  fill(keys[0], '2');
+  const job_needs needs = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
+  assert_int_equal(catalogue_job_wait(n->cat[0], &needs), STORE_OK);
+  assert_int_equal(catalogue_job_cancel(n->cat[1], row.id), STORE_OK);
+  whole.row.attempt = 0;
+  assert_int_equal(finish(n, 1, &whole, API_JOB_CANCELLED, NULL), STORE_OK);
+  assert_int_equal(claim(n, 1, &part), STORE_OK);
+  assert_string_equal(part.row.key, keys[0]);
+  assert_true(part.cancel);
+  submit(n, 0, "ann", '3', 0, &row);
+  assert_int_equal(claim(n, 0, &whole), STORE_OK);
+  assert_int_equal(catalogue_job_cancel(n->cat[1], row.id), STORE_OK);
+  const job_needs late = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
+  assert_int_equal(catalogue_job_wait(n->cat[0], &late), STORE_CONFLICT);
+}
+
+static void note(void *user, const char *text) {
+  char *heard = user;
+  if (text[0] == heard[0]) {
+    heard[1]++;
+  }
+}
+
+static void test_notices(void **state) {
+  nodes *n = *state;
+  job_row row;
+  job_claim c;
+  char queued[2] = {'q', 0}, changed[2] = {'j', 0};
+  submit(n, 0, "ann", '1', 0, &row);
+  for (int i = 0; i < 100 && !queued[1]; i++) {
+    notices_wait(n->bell[1], 100, note, queued);
+  }
+  assert_int_equal(queued[1], 1);
+  assert_int_equal(claim(n, 0, &c), STORE_OK);
+  end(n, 0, &c);
+  for (int i = 0; i < 100 && changed[1] < 2; i++) {
+    notices_wait(n->bell[1], 100, note, changed);
+  }
+  assert_int_equal(changed[1], 2);
+  assert_true(notices_keeps_house(n->bell[0]));
+  assert_false(notices_keeps_house(n->bell[1]));
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test_setup_teardown(test_order, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_one_flight, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_limits, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_lease, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_crashes, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_own_last_life, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_needs, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_cancel, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_notices, setup, teardown),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
