@@ -196,8 +196,11 @@ orb_status orb_zip_read(orb_context *ctx, const orb_zip *zip, const orb_zip_entr
   if (entry->is_encrypted) {
     return orb_build_malformed(ctx, 0, (int64_t)entry->local, "The ZIP archive is encrypted; send one that is not.");
   }
+  if (!is_within(zip->size, entry->local, LOCAL_SIZE)) {
+    return damaged(&u);
+  }
   const unsigned char *local = zip->bytes + entry->local;
-  if (!is_within(zip->size, entry->local, LOCAL_SIZE) || orb_read_u32(local, 0) != LOCAL_SIGNATURE) {
+  if (orb_read_u32(local, 0) != LOCAL_SIGNATURE) {
     return damaged(&u);
   }
   uint64_t begin = (uint64_t)entry->local + LOCAL_SIZE + orb_read_u16(local + 26, 0) + orb_read_u16(local + 28, 0);
