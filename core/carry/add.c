@@ -11,6 +11,7 @@
 #include "carry/corners.h"
 #include "format/gltf_add.h"
 #include "mesh/dropped.h"
+#include "orbmorph/utf8.h"
 
 /* What the additions are made of; memory of the context. */
 typedef struct adder {
@@ -125,7 +126,7 @@ static orb_status list_carried(orb_context *ctx, const orb_carrier *carrier, con
     (void)snprintf(one->as, sizeof one->as, "%s", more->variants[i].name);
   }
   if (carrier->skin_carry >= 0) {
-    (void)snprintf(list_one(carrier, carrier->skin_carry, *list, count)->as, ORB_NAME_MAX, "JOINTS_0");
+    (void)snprintf(list_one(carrier, carrier->skin_carry, *list, count)->as, sizeof(*list)->as, "JOINTS_0");
   }
   return ORB_OK;
 }
@@ -134,13 +135,13 @@ static orb_status list_carried(orb_context *ctx, const orb_carrier *carrier, con
 static orb_status list_targets(orb_context *ctx, const orb_carrier *carrier, const int32_t *vertices,
                                int32_t vertex_count, const orb_buffer *asset, orb_carried *list, int32_t *count) {
   int32_t targets = carrier->target_count;
-  char(*found)[ORB_NAME_MAX] = orb_calloc(ctx, (size_t)targets + 1, sizeof *found);
+  orb_given_name *found = ORB_NEW0(ctx, orb_given_name, (int64_t)targets + 1);
   orb_status status =
       found ? orb_given_last_targets(ctx, asset->data, asset->size, vertices, vertex_count, targets, found)
             : ORB_E_NO_MEMORY;
   for (int32_t k = 0; status == ORB_OK && k < targets; k++) {
     orb_carried *one = list_one(carrier, carrier->target_carry[k], list, count);
-    (void)snprintf(one->as, sizeof one->as, "%s", *found[k] ? found[k] : carrier->targets[k].name);
+    (void)orb_utf8_copy(one->as, sizeof one->as, *found[k] ? found[k] : carrier->targets[k].name);
   }
   orb_free(ctx, found);
   return status;
@@ -159,7 +160,7 @@ static void describe_variant(const orb_mesh *mesh, const orb_baked *baked, const
     const orb_material_value *value = &mesh->material_values[material->first_value + v];
     out->is_double_sided |= value->member == ORB_MATERIAL_DOUBLE_SIDED && value->number[0] > 0;
   }
-  (void)snprintf(out->name, sizeof out->name, "%s", name);
+  (void)orb_utf8_copy(out->name, ORB_NAME_MAX, name); /* the rest is for a number that makes it unique */
 }
 
 static orb_status bake_one(orb_context *ctx, const orb_carrier *carrier, int32_t number, const orb_given_charts *charts,

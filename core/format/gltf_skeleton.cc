@@ -1,8 +1,5 @@
 #include "format/gltf_skeleton.hh"
 
-#include <map>
-#include <set>
-
 #include "format/gltf_parse.hh"
 
 extern "C" {
@@ -12,6 +9,8 @@ extern "C" {
 namespace gltf {
 
 namespace {
+
+const size_t CHECK_EVERY = 4096; /* nodes or joints between two checks for cancellation */
 
 const double SAME = 1e-3; /* transforms of a rest that differ by less are one: exporters round them to float32 */
 
@@ -62,23 +61,42 @@ bool is_near(const Matrix &a, const Matrix &b) {
   return true;
 }
 
+using Matrices = std::vector<Matrix, Charged<Matrix>>;
+using Indices = std::vector<int64_t, Charged<int64_t>>;
+
+void check_sometimes(orb_context *ctx, size_t step) {
+  if (step % CHECK_EVERY == 0) {
+    must(orb_context_check(ctx));
+  }
+}
+
+/* The joints of a skin and all nodes above them. */
 struct Skeleton {
   orb_context *ctx;
   const cJSON *source;
   const cJSON *skin;
   List nodes;
-  std::vector<int64_t> joints, above; /* above: the parent of each node */
+  Indices joints, above; /* above: the parent of each node */
+  Indices kept;          /* the nodes, by their numbers */
+  Matrices worlds;       /* of each node that is kept; the others have the identity */
 
   Skeleton(orb_context *context, const cJSON *document, int32_t number)
       : ctx(context),
         source(document),
         skin(element(array_of(document, "skins"), number, "skin")),
         nodes(array_of(document, "nodes")),
-        above(nodes.size(), NONE) {
+        joints(Charged<int64_t>(context)),
+        above(nodes.size(), NONE, Charged<int64_t>(context)),
+        kept(Charged<int64_t>(context)),
+        worlds(nodes.size(), Matrix(), Charged<Matrix>(context)) {
     for (size_t i = 0; i < nodes.size(); i++) {
+      check_sometimes(ctx, i);
       for (const cJSON *child : array_of(nodes[i], "children")) {
         int64_t index = number_of(child);
         (void)element(nodes, index, "node");
+        if (above[static_cast<size_t>(index)] != NONE) {
+          refuse_loop(index);
+        }
         above[static_cast<size_t>(index)] = static_cast<int64_t>(i);
       }
     }
@@ -86,36 +104,48 @@ struct Skeleton {
       joints.push_back(number_of(joint));
       (void)element(nodes, joints.back(), "node");
     }
+    place_nodes();
   }
 
-  /* The joints and all nodes above them. */
-  std::set<int64_t> kept() const {
-    std::set<int64_t> out;
-    for (int64_t joint : joints) {
-      size_t steps = 0;
-      for (int64_t n = joint; n != NONE && out.insert(n).second; n = above[static_cast<size_t>(n)]) {
-        if (++steps > nodes.size()) {
-          malformed("A node of the glTF file is a child of itself.");
-        }
-      }
-    }
-    return out;
+  [[noreturn]] static void refuse_loop(int64_t node) {
+    malformed("Node " + std::to_string(node) + " of the glTF file is a child of two nodes, or of itself.");
   }
 
-  Matrix world(int64_t node) const {
-    Matrix out;
+  const Matrix &world(int64_t node) const { return worlds[static_cast<size_t>(node)]; }
+
+  /* Goes up from each joint to a node that is done, and from there back down. */
+  void place_nodes() {
+    enum : unsigned char { NEW, OPEN, DONE };
+    std::vector<unsigned char, Charged<unsigned char>> state(nodes.size(), NEW, Charged<unsigned char>(ctx));
+    Indices path{Charged<int64_t>(ctx)};
     size_t steps = 0;
-    for (int64_t n = node; n != NONE; n = above[static_cast<size_t>(n)]) {
-      out = matrix_of(nodes[static_cast<size_t>(n)]) * out;
-      if (++steps > nodes.size()) {
-        malformed("A node of the glTF file is a child of itself.");
+    for (int64_t joint : joints) {
+      int64_t n = joint;
+      for (; n != NONE && state[static_cast<size_t>(n)] != DONE; n = above[static_cast<size_t>(n)]) {
+        check_sometimes(ctx, steps++);
+        if (state[static_cast<size_t>(n)] == OPEN) {
+          refuse_loop(n);
+        }
+        state[static_cast<size_t>(n)] = OPEN;
+        path.push_back(n);
+      }
+      Matrix to = n == NONE ? Matrix() : world(n);
+      for (; !path.empty(); path.pop_back()) {
+        size_t at = static_cast<size_t>(path.back());
+        check_sometimes(ctx, steps++);
+        to = worlds[at] = to * matrix_of(nodes[at]);
+        state[at] = DONE;
       }
     }
-    return out;
+    for (size_t i = 0; i < nodes.size(); i++) {
+      if (state[i] == DONE) {
+        kept.push_back(static_cast<int64_t>(i));
+      }
+    }
   }
 
-  std::vector<Matrix> inverse_binds(const Buffers &buffers) const {
-    std::vector<Matrix> out(joints.size());
+  Matrices inverse_binds(const Buffers &buffers) const {
+    Matrices out(joints.size(), Matrix(), Charged<Matrix>(ctx));
     int64_t index = whole(skin, "inverseBindMatrices", NONE);
     if (index == NONE) {
       return out;
@@ -150,40 +180,49 @@ cJSON *scene_of(cJSON *doc) {
   return scenes.empty() ? nullptr : editable(element(scenes, whole(doc, "scene", 0), "scene"));
 }
 
-/* Copies the nodes; returns the new number of each. wrap: the transform above their roots. */
-std::map<int64_t, int64_t> copy_nodes(const Skeleton &from, cJSON *doc, const Matrix &wrap) {
-  std::map<int64_t, int64_t> number;
-  std::vector<int64_t> roots;
-  const std::set<int64_t> kept = from.kept();
+/* Copies the nodes; returns the new number of each, NONE for those that stay behind. wrap: the transform above their
+ * roots. */
+Indices copy_nodes(const Skeleton &from, cJSON *doc, const Matrix &wrap) {
+  Indices number(from.nodes.size(), NONE, Charged<int64_t>(from.ctx)), roots{Charged<int64_t>(from.ctx)};
+  std::vector<cJSON *, Charged<cJSON *>> copies{Charged<cJSON *>(from.ctx)};
   cJSON *nodes = array_in(doc, "nodes");
-  for (int64_t n : kept) {
-    number[n] = append(nodes, copy_node(from.nodes[static_cast<size_t>(n)]));
+  int64_t next = cJSON_GetArraySize(nodes);
+  for (int64_t n : from.kept) {
+    check_sometimes(from.ctx, copies.size());
+    copies.push_back(copy_node(from.nodes[static_cast<size_t>(n)]));
+    push(nodes, copies.back());
+    number[static_cast<size_t>(n)] = next++;
   }
-  for (int64_t n : kept) {
-    cJSON *copy = cJSON_GetArrayItem(nodes, static_cast<int>(number[n]));
-    for (const cJSON *child : array_of(from.nodes[static_cast<size_t>(n)], "children")) {
-      auto found = number.find(number_of(child));
-      if (found != number.end()) {
-        append(array_in(copy, "children"), cJSON_CreateNumber(static_cast<double>(found->second)));
+  for (size_t k = 0; k < copies.size(); k++) {
+    size_t n = static_cast<size_t>(from.kept[k]);
+    cJSON *children = nullptr;
+    check_sometimes(from.ctx, k);
+    for (const cJSON *child : array_of(from.nodes[n], "children")) {
+      int64_t copy = number[static_cast<size_t>(number_of(child))];
+      if (copy != NONE) {
+        children = children ? children : array_in(copies[k], "children");
+        push(children, cJSON_CreateNumber(static_cast<double>(copy)));
       }
     }
-    if (from.above[static_cast<size_t>(n)] == NONE) {
+    if (from.above[n] == NONE) {
       roots.push_back(number[n]);
     }
   }
   if (!wrap.identity) {
     cJSON *above = made(cJSON_CreateObject());
-    int64_t index = append(nodes, above);
+    push(nodes, above);
     set(above, "name", cJSON_CreateString("skeleton"));
     set(above, "matrix", cJSON_CreateDoubleArray(wrap.m, 16));
+    cJSON *children = array_in(above, "children");
     for (int64_t root : roots) {
-      append(array_in(above, "children"), cJSON_CreateNumber(static_cast<double>(root)));
+      push(children, cJSON_CreateNumber(static_cast<double>(root)));
     }
-    roots.assign(1, index);
+    roots.assign(1, next);
   }
   if (cJSON *scene = scene_of(doc)) {
+    cJSON *shown = array_in(scene, "nodes");
     for (int64_t root : roots) {
-      append(array_in(scene, "nodes"), cJSON_CreateNumber(static_cast<double>(root)));
+      push(shown, cJSON_CreateNumber(static_cast<double>(root)));
     }
   }
   return number;
@@ -197,7 +236,7 @@ int64_t copy_skin(orb_context *ctx, cJSON *doc, Editor *editor, const orb_added_
   buffers.load(source.root(), source.chunk(), from.size);
   const Skeleton skeleton(ctx, source.root(), from.skin);
   const Matrix moved = matrix_from(from.moved), place = matrix_from(from.place);
-  std::vector<Matrix> binds = skeleton.inverse_binds(buffers);
+  const Matrices binds = skeleton.inverse_binds(buffers);
 
   /* A vertex p of the source is shown at world · bind · p, and was read at place · p. Where its rest shows it without
    * `place`, the skeleton is moved by that as well. */
@@ -217,12 +256,12 @@ int64_t copy_skin(orb_context *ctx, cJSON *doc, Editor *editor, const orb_added_
       }
     }
   }
-  std::map<int64_t, int64_t> number = copy_nodes(skeleton, doc, wrap);
+  const Indices number = copy_nodes(skeleton, doc, wrap);
   cJSON *skin = made(cJSON_CreateObject());
   int64_t index = append(array_in(doc, "skins"), skin);
   cJSON *joints = array_in(skin, "joints");
   for (int64_t joint : skeleton.joints) {
-    append(joints, cJSON_CreateNumber(static_cast<double>(number[joint])));
+    push(joints, cJSON_CreateNumber(static_cast<double>(number[static_cast<size_t>(joint)])));
   }
   int64_t accessor =
       editor->add_list(values.data(), values.size() * sizeof(float), ORB_GLTF_FLOAT, binds.size(), "MAT4", false);
@@ -231,9 +270,9 @@ int64_t copy_skin(orb_context *ctx, cJSON *doc, Editor *editor, const orb_added_
   if (!name.empty()) {
     set(skin, "name", cJSON_CreateString(name.c_str()));
   }
-  auto root = number.find(index_of(skeleton.skin, "skeleton"));
-  if (root != number.end()) {
-    set(skin, "skeleton", static_cast<double>(root->second));
+  size_t root = static_cast<size_t>(index_of(skeleton.skin, "skeleton"));
+  if (root < number.size() && number[root] != NONE) {
+    set(skin, "skeleton", static_cast<double>(number[root]));
   }
   return index;
 }

@@ -196,6 +196,22 @@ test('targets of equal names get a number', async (t) => {
   assert.deepEqual(await named(twice, { method: 'adaptive' }, [1, 2]), ['smile', 'other', 'smile (2)', 'smile (3)']);
   const kept = [shape(body, 'body'), shape(body, 'other')];
   assert.deepEqual(await named(kept, { method: 'template' }, [1]), ['smile', 'other', 'smile (2)']);
+
+  // Names are cut between characters, and what the report calls a target is its name in the asset.
+  for (const [name, cut] of [
+    ['x'.repeat(127), 'x'.repeat(127)],
+    ['é'.repeat(80), 'é'.repeat(63)],
+  ]) {
+    const bean = shapes.bean(2);
+    const edit = (gltf) => {
+      gltf.meshes[0].extras = { targetNames: [name] };
+    };
+    const bytes = writeGlb({ ...bean, moves: bean.positions.map(() => [0, 0.1, 0]), edit });
+    const other = await uploaded(d, bytes, { name: 'bean' });
+    const list = [shape(egg, 'egg'), shape(other, 'one'), shape(other, 'two')];
+    const names = await named(list, { method: 'adaptive' }, [1, 2]);
+    assert.deepEqual(names, ['one', 'two', cut, `${cut} (2)`]);
+  }
 });
 
 test('a skin that cannot be taken is refused', async (t) => {
