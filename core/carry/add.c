@@ -11,6 +11,7 @@
 #include "carry/corners.h"
 #include "format/gltf_add.h"
 #include "mesh/dropped.h"
+#include "numeric/vec3.h"
 #include "orbmorph/utf8.h"
 
 /* What the additions are made of; memory of the context. */
@@ -20,7 +21,8 @@ typedef struct adder {
   float **values;
   uint16_t *joints; /* 4 a vertex, as the weights */
   float *weights;
-  orb_baked *baked; /* as many as textures, as the variants and images */
+  double *before, *after, *area; /* of the surface of a skin */
+  orb_baked *baked;              /* as many as textures, as the variants and images */
   orb_added_variant *variants;
   orb_added_image **images;
   int32_t *texture_carry;
@@ -47,6 +49,9 @@ static void adder_free(orb_context *ctx, const orb_carrier *carrier, adder *a) {
   orb_free(ctx, a->corner);
   orb_free(ctx, a->joints);
   orb_free(ctx, a->weights);
+  orb_free(ctx, a->before);
+  orb_free(ctx, a->after);
+  orb_free(ctx, a->area);
 }
 
 /* The value of each vertex of the asset; those off the surface get white, or zeros. */
@@ -69,6 +74,55 @@ static orb_status fill_sets(orb_context *ctx, const orb_carrier *carrier, int32_
     }
     a->sets[i] = (orb_added_set){.width = wedges->width, .values = values};
   }
+  return ORB_OK;
+}
+
+/* The surface of the asset on a shape, in the coordinates of the asset. */
+static orb_status surface_on(orb_context *ctx, const orb_carrier *carrier, int32_t shape, double **out) {
+  const orb_supermesh *mesh = carrier->job.supermesh;
+  const double *m = carrier->moved + 16 * (int64_t)shape;
+  double *points = *out = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
+  if (!points) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(orb_transfer_positions(ctx, &carrier->job.shapes[shape], mesh->places + (int64_t)shape * mesh->vertex_count,
+                                 mesh->vertex_count, points));
+  for (int64_t v = 0; v < mesh->vertex_count; v++) {
+    double *p = points + 3 * v, moved[3];
+    for (int k = 0; k < 3; k++) {
+      moved[k] = m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2] + m[12 + k];
+    }
+    memcpy(p, moved, sizeof moved);
+  }
+  return ORB_OK;
+}
+
+/* What the joints of a skin are fitted by. */
+static orb_status fill_surface(orb_context *ctx, const orb_carrier *carrier, int32_t from, adder *a,
+                               orb_skin_surface *out) {
+  const orb_supermesh *mesh = carrier->job.supermesh;
+  a->area = ORB_NEW0(ctx, double, mesh->vertex_count);
+  if (!a->area) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(surface_on(ctx, carrier, from, &a->before));
+  ORB_TRY(surface_on(ctx, carrier, 0, &a->after));
+  for (int64_t t = 0; t < mesh->triangle_count; t++) {
+    const int32_t *corner = mesh->triangles + 3 * t;
+    double u[3], w[3], n[3];
+    orb_sub(a->after + 3 * (int64_t)corner[1], a->after + 3 * (int64_t)corner[0], u);
+    orb_sub(a->after + 3 * (int64_t)corner[2], a->after + 3 * (int64_t)corner[0], w);
+    orb_cross(u, w, n);
+    for (int k = 0; k < 3; k++) {
+      a->area[corner[k]] += orb_length(n) / 6;
+    }
+  }
+  *out = (orb_skin_surface){.count = mesh->vertex_count,
+                            .before = a->before,
+                            .after = a->after,
+                            .area = a->area,
+                            .joints = (const uint16_t(*)[4])carrier->skin.joints,
+                            .weights = (const float(*)[4])carrier->skin.weights};
   return ORB_OK;
 }
 
@@ -98,7 +152,7 @@ static orb_status fill_skin(orb_context *ctx, const orb_carrier *carrier, const 
                           .weights = a->weights};
   memcpy(out->place, skin->given.place, sizeof out->place);
   memcpy(out->moved, carrier->moved + 16 * (int64_t)carry->from, sizeof out->moved);
-  return ORB_OK;
+  return fill_surface(ctx, carrier, carry->from, a, &out->surface);
 }
 
 static orb_carried *list_one(const orb_carrier *carrier, int32_t number, orb_carried *list, int32_t *count) {
@@ -269,6 +323,9 @@ orb_status orb_carried_settle(orb_context *ctx, const orb_carried *carried, int3
     int is_settled = 0;
     for (int32_t k = 0; k < count && !is_settled; k++) {
       is_settled = is_about(&(*dropped)[i], &carried[k]);
+      if (carried[k].what == ORB_CARRY_SKIN && carried[k].from == 0 && strcmp((*dropped)[i].what, "animations") == 0) {
+        (*dropped)[i].why = "Of the animations, the asset has those of its skeleton.";
+      }
     }
     if (!is_settled) {
       (*dropped)[left++] = (*dropped)[i];
