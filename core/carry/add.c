@@ -152,7 +152,7 @@ static orb_status fill_skin(orb_context *ctx, const orb_carrier *carrier, const 
                           .weights = a->weights};
   memcpy(out->place, skin->given.place, sizeof out->place);
   memcpy(out->moved, carrier->moved + 16 * (int64_t)carry->from, sizeof out->moved);
-  return fill_surface(ctx, carrier, carry->from, a, &out->surface);
+  return carry->from > 0 ? fill_surface(ctx, carrier, carry->from, a, &out->surface) : ORB_OK; /* its own fits */
 }
 
 static orb_carried *list_one(const orb_carrier *carrier, int32_t number, orb_carried *list, int32_t *count) {

@@ -209,6 +209,10 @@ test('the own skin and targets of the first shape, on a new mesh', async (t) => 
   assert.equal(why, 'Of the animations, the asset has those of its skeleton.', 'not those of its targets');
   const result = await assetOf(d, made);
   assert.deepEqual(result.gltf.meshes[0].extras.targetNames, ['egg', 'smile']);
+  const joints = result.gltf.nodes.filter(({ name }) => /^joint/.test(name));
+  joints.forEach((node, j) =>
+    assert.deepEqual(node.translation, [0, j ? HEIGHT / (JOINTS - 1) : 0, 0], 'its own fits'),
+  );
   assert.equal(result.all.length, 2, 'a part for each material');
   for (const part of result.all) {
     const places = Array.from({ length: part.POSITION.length / 3 }, (_, v) => part.POSITION.slice(3 * v, 3 * v + 3));
