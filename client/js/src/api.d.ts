@@ -266,7 +266,7 @@ export type SupermeshRequest = {
     /** Names of nodes: the meshes that they and the nodes below them show. */
     nodes?: string[];
   };
-  /** What the asset gets of the shapes besides their surfaces, by places: the skin with its skeleton; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) where the shape does not have it. `transferred` of the supermesh says what came of it. Such an asset has the profile float only. */
+  /** What the asset gets of the shapes besides their surfaces, by places: the skin with its skeleton, fitted to the first shape, and the animations of that; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) where the shape does not have it. `transferred` of the supermesh says what came of it. Such an asset has the profile float only. */
   transfer?: Array<{
     /** The shape, from 0 in their order. */
     from: number;
