@@ -199,8 +199,17 @@ int queue_cancel_wanted(queue *q, job *j);
 void queue_progress(queue *q, job *j, const char *stage, double fraction);
 void queue_add_embed_ms(queue *q, job *j, double ms);
 double queue_embed_ms(queue *q, job *j);
-/* Ends a taken job with its result or problem. If the store fails, the job is queued again and retried later. */
-void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result);
+/* Ends a taken job that made nothing, or whose result was there. If the store fails, the job is queued again and retried
+ * later. */
+void queue_finish(queue *q, job *j, api_job_state state, const char *problem);
+/* Ends a taken job that made a result while it held the store of objects. If that hold was lost, published() takes it
+ * again and says whether the objects of the result are still there; if they are not, the job is queued again. */
+typedef struct queue_made {
+  const resource *result;
+  int (*published)(void *user);
+  void *user;
+} queue_made;
+void queue_finish_made(queue *q, job *j, const queue_made *made);
 /* Ends a taken job that fetched a mesh, which is stored. */
 void queue_finish_mesh(queue *q, job *j, const char *mesh);
 /* Returns a taken job that was not claimed; it is retried after a second. For a store that fails. */

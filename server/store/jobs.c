@@ -183,7 +183,7 @@ static int finish(database *db, void *arg) {
 
 store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, const job_end *end) {
   change c = {.id = id, .attempt = attempt, .end = end};
-  return catalogue_write(cat, finish, &c);
+  return end->result ? catalogue_write_held(cat, finish, &c) : catalogue_write(cat, finish, &c);
 }
 
 static int read_row(sql_statement *st, void *to) {

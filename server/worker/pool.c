@@ -123,7 +123,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
     const orb_error *error = orb_context_error(ctx);
     if (error->status == ORB_E_CANCELLED) {
       if (queue_cancel_wanted(env->q, j)) {
-        queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
+        queue_finish(env->q, j, API_JOB_CANCELLED, NULL);
       } else {
         queue_give_back(env->q, j); /* the service is stopping */
       }
@@ -133,7 +133,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
   }
   api_text text = {0};
   api_problem_write(problem, &text);
-  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data, NULL);
+  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data);
   api_text_free(&text);
 }
 
@@ -230,7 +230,7 @@ static void crashed(const run_env *env, job *j, const isolated_end *end) {
       "this as a bug, with its meshes.",
       MOST_CRASHES, end->why);
   api_problem_write(&problem, &text);
-  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data, NULL);
+  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data);
   api_text_free(&text);
   api_problem_free(&problem);
 }
@@ -242,6 +242,33 @@ static int lacks_memory(orb_context *ctx, const api_problem *problem) {
 /* Whether a job that ran since `began` may have failed because a store was away. */
 static int may_be_store(const run_env *env, int64_t began) {
   return objects_are_away(env->store) || catalogue_was_away(env->cat, began);
+}
+
+typedef struct made {
+  const run_env *env;
+  const resource *row;
+} made;
+
+static int is_published(void *user) {
+  const made *m = user;
+  named_object named[RESOURCE_OBJECTS];
+  const int count = resource_objects(m->row, named);
+  int there = 1;
+  objects_hold_again(m->env->store);
+  for (int i = 0; i < count && there; i++) {
+    there = objects_look(m->env->store, named[i].kind, m->row->id) == STORE_OK;
+  }
+  return there;
+}
+
+/* row: without JSON, the result existed already. */
+static void finish_made(const run_env *env, job *j, const resource *row) {
+  if (row->json) {
+    made m = {env, row};
+    queue_finish_made(env->q, j, &(queue_made){row, is_published, &m});
+  } else {
+    queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL);
+  }
 }
 
 static void run_claimed(worker_pool *pool, job *j, int threads) {
@@ -275,7 +302,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     if (embedding) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
     }
-    queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
+    finish_made(env, j, &out.row);
   } else if (out.gone || (may_be_store(env, began) && !queue_cancel_wanted(env->q, j))) {
     queue_give_back(env->q, j); /* a worker plans it again, once the stores are back */
   } else if (!lacks_memory(ctx, &problem) || !queue_needs_memory(env->q, j)) {
@@ -292,7 +319,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
 static void run_one(worker_pool *pool, job *j, int threads) {
   const run_env *env = &pool->env;
   if (queue_cancel_wanted(env->q, j)) {
-    queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
+    queue_finish(env->q, j, API_JOB_CANCELLED, NULL);
     return;
   }
   if (objects_are_away(env->store)) {
@@ -305,7 +332,7 @@ static void run_one(worker_pool *pool, job *j, int threads) {
   }
   char *reason = queue_dependency_problem(env->q, j);
   if (reason) {
-    queue_finish(env->q, j, API_JOB_FAILED, reason, NULL);
+    queue_finish(env->q, j, API_JOB_FAILED, reason);
     free(reason);
     return;
   }
