@@ -12,7 +12,7 @@ static void release_dependents(queue *q, job *ended) {
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
       if (is_for(ended, j->dependencies[d], j->row.owner)) {
-        j->waits_for--;
+        j->ready = --j->waits_for ? j->ready : unix_ms();
         if (ended->row.state == API_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
           j->dependency_problem = strdup(ended->row.problem);
         }

@@ -87,7 +87,7 @@ static int read_claimed(database *db, const char *id, job_claim *out) {
   sql_statement *st =
       database_statement(db, "SELECT " JOB_COLUMNS
                              ", (SELECT coalesce(max(number), 0) FROM event e WHERE e.job=job.id), big, cancel,"
-                             " (SELECT coalesce(sum(ready), 0) FROM turn) FROM job WHERE id=?1");
+                             " (SELECT coalesce(sum(ready), 0) FROM turn), ready FROM job WHERE id=?1");
   if (!st) {
     return SQL_ERROR;
   }
@@ -95,10 +95,11 @@ static int read_claimed(database *db, const char *id, job_claim *out) {
   int code = sql_step(st);
   if (code == SQL_ROW) {
     code = job_rows.read(st, &out->row) ? SQL_OK : SQL_NOMEM;
-    out->last_event = sql_integer(st, 20);
-    out->big = sql_int(st, 21);
-    out->cancel = sql_int(st, 22);
-    out->beside = sql_integer(st, 23);
+    out->last_event = sql_integer(st, 21);
+    out->big = sql_int(st, 22);
+    out->cancel = sql_int(st, 23);
+    out->beside = sql_integer(st, 24);
+    out->ready = sql_integer(st, 25);
   }
   sql_reset(st);
   if (code == SQL_NOMEM) {
@@ -139,7 +140,7 @@ static int insert_job(database *db, job_row *r) {
   sql_statement *st = database_statement(
       db,
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
-      " charged) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10) RETURNING seq");
+      " charged, trace) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) RETURNING seq");
   if (!st) {
     return SQL_ERROR;
   }
@@ -153,6 +154,7 @@ static int insert_job(database *db, job_row *r) {
   sql_bind_text(st, 8, r->request);
   sql_bind_integer(st, 9, r->created);
   sql_bind_text(st, 10, r->charged);
+  sql_bind_text(st, 11, r->trace);
   int code = sql_step(st);
   r->seq = code == SQL_ROW ? sql_integer(st, 0) : 0;
   sql_reset(st);
@@ -255,6 +257,7 @@ static int need_one(database *db, const job_needs *n, int i) {
     memcpy(row.key, n->keys[i], sizeof row.key);
     memcpy(row.owner, n->row->owner, sizeof row.owner);
     memcpy(row.charged, n->row->charged, sizeof row.charged);
+    memcpy(row.trace, n->row->trace, sizeof row.trace);
     row.request = (char *)(uintptr_t)n->requests[i];
     code = crash_check(db, row.key);
     code = code == SQL_OK ? insert_job(db, &row) : code;

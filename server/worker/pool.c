@@ -19,6 +19,7 @@
 #include "store/keys.h"
 #include "store/owners.h"
 #include "worker/isolated.h"
+#include "worker/spans.h"
 
 enum { FETCHERS = 8 };
 
@@ -165,7 +166,12 @@ static void report(const job *j, int fine, double seconds) {
   log_write(LOG_INFO, fields, "%s job %s", api_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
 }
 
-static void fetch_one(worker_pool *pool, job *j) {
+/* In a word, for its span. */
+static const char *why_failed(orb_context *ctx, const api_problem *problem) {
+  return problem->name ? problem->name : orb_status_name(orb_context_error(ctx)->status);
+}
+
+static void fetch_one(worker_pool *pool, job *j, job_spans *spans) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env = pool->env;
   char mesh[API_ID_SIZE];
@@ -174,6 +180,7 @@ static void fetch_one(worker_pool *pool, job *j) {
   int64_t began = orb_clock_ms();
   env.progress = &progress;
   queue_show_running(env.q, j);
+  spans_run(spans, env.q, j, &progress);
   orb_context *ctx = begin(pool, j, 1, &progress);
   if (!ctx) {
     return;
@@ -182,6 +189,7 @@ static void fetch_one(worker_pool *pool, job *j) {
   queue_set_context(env.q, j, NULL);
   progress_enter(&progress, "");
   report(j, fine, 1e-3 * (double)(orb_clock_ms() - began));
+  spans_end(spans, fine ? NULL : why_failed(ctx, &problem));
   if (!claimed) {
     queue_put_off(env.q, j);
   } else if (fine) {
@@ -271,7 +279,7 @@ static void finish_made(const run_env *env, job *j, const resource *row) {
   }
 }
 
-static void run_claimed(worker_pool *pool, job *j, int threads) {
+static void run_claimed(worker_pool *pool, job *j, int threads, job_spans *spans) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env_of_job = pool->env, *env = &env_of_job;
   env_of_job.progress = &progress;
@@ -279,6 +287,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   api_problem problem = {0};
   run_output out = {0};
   int64_t began = orb_clock_ms();
+  spans_run(spans, env->q, j, &progress);
   orb_context *ctx = begin(pool, j, threads, &progress);
   if (!ctx) {
     return;
@@ -296,6 +305,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     catalogue_key_use(env->cat, job_charged(j), (int64_t)time(NULL) / 86400, 0, (int64_t)(1e3 * seconds * threads));
   }
   report(j, fine, seconds);
+  spans_end(spans, fine ? NULL : end.died ? "job-crashed" : why_failed(ctx, &problem));
   if (end.died) {
     crashed(env, j, &end);
   } else if (fine) {
@@ -318,6 +328,8 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
 
 static void run_one(worker_pool *pool, job *j, int threads) {
   const run_env *env = &pool->env;
+  job_spans spans;
+  spans_begin(&spans, env->q, j);
   if (queue_cancel_wanted(env->q, j)) {
     queue_finish(env->q, j, API_JOB_CANCELLED, NULL);
     return;
@@ -327,7 +339,7 @@ static void run_one(worker_pool *pool, job *j, int threads) {
     return;
   }
   if (job_kind(j) == API_JOB_FETCH) {
-    fetch_one(pool, j);
+    fetch_one(pool, j, &spans);
     return;
   }
   char *reason = queue_dependency_problem(env->q, j);
@@ -338,13 +350,14 @@ static void run_one(worker_pool *pool, job *j, int threads) {
   }
   int waits = job_kind(j) == API_JOB_SUPERMESH ? plan(env, j) : 0;
   if (waits > 0) {
+    spans_queue(&spans);
     return;
   }
   if (waits < 0 || queue_claim(env->q, j) != STORE_OK) {
     queue_put_off(env->q, j);
     return;
   }
-  run_claimed(pool, j, threads);
+  run_claimed(pool, j, threads, &spans);
 }
 
 static void *worker_main(void *argument) {

@@ -10,7 +10,9 @@ import { mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
+import { Collector } from './support/collector.mjs';
 import { assertProblem, Daemon, endless, patience, samples, until } from './support/daemon.mjs';
+import { haproxy, lacksHaproxy } from './support/haproxy.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const program = process.env.ORB_DAEMON; // that starts with a catalogue and objects of its own
@@ -141,16 +143,21 @@ const slowJob = async (node, scale = 1) =>
 
 test('what one node accepts, others run and show', async (t) => {
   const c = new Cluster(t);
-  const a = await c.node('--role', 'serve');
-  const b = await c.node('--role', 'serve');
-  const w = await c.node('--role', 'work');
-  assert.match(w.out, /works without a port/);
+  const traces = await Collector.start(t);
+  const a = await c.node('--role', 'serve', '--traces', traces.url);
+  const b = await c.node('--role', 'serve', '--traces', traces.url);
   const { id } = await a.mesh(path.join(samples, 'dog.obj'));
   assert.equal((await b.get(`/v1/meshes/${id}`)).status, 200);
   const reply = await a.post('/v1/embeddings', { mesh: id });
   assert.equal(reply.status, 202);
   const twice = await b.post('/v1/embeddings', { mesh: id });
-  if (twice.status === 202) assert.equal(twice.json.id, reply.json.id); // one flight a key
+  assert.equal(twice.status, 202);
+  assert.equal(twice.json.id, reply.json.id); // one flight a key
+  const w = await c.node('--role', 'work', '--metrics-listen', '127.0.0.1:0', '--traces', traces.url);
+  for (const health of ['/livez', '/readyz']) assert.equal((await w.get(health)).status, 200);
+  for (const other of ['/v1/meshes', '/', '/openapi.json', '/v1/morph.glb'])
+    assertProblem(await w.get(other), 404, 'not-found', other);
+  assertProblem(await w.post('/v1/embeddings', {}), 404, 'not-found');
   const [here, there] = await Promise.all([a.ended(reply.json), b.ended(reply.json)]);
   assert.equal(here.state, 'succeeded');
   sameEnd(there, here);
@@ -160,7 +167,12 @@ test('what one node accepts, others run and show', async (t) => {
 
   // A supermesh waits for an embedding that it lacks; its events come from any node, and go on where they ended.
   const other = await b.upload(newMesh());
-  const merged = await b.post('/v1/supermeshes', { shapes: [{ mesh: id }, { mesh: other.json.id }] });
+  const trace = '4bf92f3577b34da6a3ce929d0e0e4736';
+  const merged = await b.post(
+    '/v1/supermeshes',
+    { shapes: [{ mesh: id }, { mesh: other.json.id }] },
+    { headers: { traceparent: `00-${trace}-00f067aa0ba902b7-01` } },
+  );
   assert.equal(merged.status, 202, merged.bytes.toString());
   const first = await eventsOf(a, merged.json, 0, (event) => event.type === 'progress');
   const rest = await eventsOf(b, merged.json, first.at(-1).number, () => false);
@@ -172,13 +184,61 @@ test('what one node accepts, others run and show', async (t) => {
     204,
   );
 
+  // Two nodes had part in it, and one trace has both.
+  const of = (span) => span.trace === trace;
+  await until(() => traces.named('supermesh job', of).length > 0, 'the span of the job');
+  const [asked] = traces.named('POST /v1/supermeshes', of);
+  const [ran] = traces.named('supermesh job', of);
+  assert.equal(ran.parent, asked.id);
+  assert.deepEqual(
+    [asked, ran].map(({ resource }) => resource['orbmorph.role']),
+    ['serve', 'work'],
+  );
+  assert.ok(traces.named('remesh', of).every(({ parent }) => parent === ran.id));
+  assert.equal(traces.named('embedding job', of)[0].parent, asked.id);
+
+  // The node that has done the work counts it, those that serve do not.
+  const done = async (node) =>
+    /^orbmorph_jobs_ended_total\{state="succeeded"\} (\d+)$/m.exec((await node.get('/metrics')).bytes)[1];
+  assert.ok(Number(await done(w)) >= 3);
+  const merges = async (node) =>
+    /^orbmorph_job_seconds_count\{kind="supermesh"\} (\d+)$/m.exec((await node.get('/metrics')).bytes)[1];
+  assert.deepEqual([await merges(a), await merges(b), await merges(w)], ['0', '0', '1']);
+
   // Deleted on one node, it is gone on all.
   const gone = rest.at(-1).job.result;
   assert.equal((await a.get(gone)).status, 200);
   assert.equal((await b.delete(gone)).status, 204);
   await until(async () => (await a.get(gone)).status === 404, 'it is gone', 10);
   assert.match(await c.check(), / 0 wrong, 0 objects without a row/);
+  if (lacksHaproxy) t.diagnostic(lacksHaproxy);
+  else await behindHaproxy(t, [a, b]);
 });
+
+/** Clients of haproxy do not miss a node that is killed. */
+async function behindHaproxy(t, [a, b]) {
+  const p = await haproxy(
+    t,
+    [a, b].map(({ url }) => url),
+  );
+  const asked = [];
+  for (let i = 0; i < 4; i++) asked.push((await p.get('/v1/meshes')).status);
+  assert.deepEqual(asked, [200, 200, 200, 200]);
+  const job = await slowJob(p);
+  const seen = await eventsOf(p, job, 0, () => true);
+  a.killed = true;
+  await a.stop('SIGKILL');
+  const mesh = await p.upload(newMesh());
+  assert.equal(mesh.status, 201);
+  const rest = eventsOf(p, job, seen.at(-1).number, ({ type }) => type === 'cancelled');
+  assert.equal((await p.get(job.url)).json.state, 'running');
+  assert.equal((await p.delete(job.url)).json.state, 'cancelled');
+  const events = await rest;
+  assert.ok(events.every(({ number }) => number > seen.at(-1).number));
+  assert.equal(events.at(-1).type, 'cancelled');
+  const made = await p.made('/v1/embeddings', { mesh: mesh.json.id });
+  assert.equal((await p.get(`/v1/embeddings/${made.id}/sphere.ply`)).status, 200);
+}
 
 test('any node cancels a job; a node that is killed loses its jobs to others', async (t) => {
   const c = new Cluster(t);
@@ -200,13 +260,14 @@ test('any node cancels a job; a node that is killed loses its jobs to others', a
   const again = await until(
     async () => {
       const { json } = await a.get(running.url);
-      return json.state === 'running' && json.attempt > running.attempt && json;
+      return json.state === 'running' && json.attempt !== running.attempt && json;
     },
     'the other node runs it',
     60,
   );
   assert.equal(await c.runner(again), second);
-  assert.equal(c.sql(`SELECT suspect FROM job WHERE id='${again.id}'`), '1');
+  assert.deepEqual([running.attempt, again.attempt], [1, 2]);
+  assert.equal(c.sql(`SELECT suspect, alone, crashes FROM job WHERE id='${again.id}'`), '1|1|0'); // it was not alone
   assert.equal((await b.delete(running.url)).json.state, 'cancelled');
   assert.equal((await a.delete(running.url)).json.state, 'cancelled'); // again, on another node
 });
@@ -215,6 +276,7 @@ test('a node that was paused beyond its lease drops what it made; others have ma
   const c = new Cluster(t);
   const serve = await c.node('--role', 'serve');
   const works = [await c.node('--role', 'work'), await c.node('--role', 'work')];
+  for (const work of works) assert.match(work.out, /works without a port/);
   const ids = [];
   for (const name of ['dog.obj', 'giraffe.off']) ids.push((await serve.mesh(path.join(samples, name))).id);
   for (const mesh of ids) await serve.made('/v1/embeddings', { mesh });
@@ -223,7 +285,8 @@ test('a node that was paused beyond its lease drops what it made; others have ma
   paused.child.kill('SIGSTOP');
   const done = await serve.ended(json);
   assert.equal(done.state, 'succeeded');
-  assert.ok(done.attempt >= 2, `${done.attempt}`);
+  assert.equal(done.attempt, 2);
+  assert.equal(c.sql(`SELECT crashes FROM job WHERE id='${json.id}'`), '0'); // it was not alone on the node that fell silent
   const asset = await serve.get(`${done.result}/asset.glb`);
   assert.equal(asset.status, 200);
   paused.child.kill('SIGCONT');
