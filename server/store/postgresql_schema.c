@@ -211,6 +211,11 @@ const char *const postgresql_migrations[] = {
     " IF NEW.state=0 AND NEW.waits=0 AND (OLD.state<>0 OR OLD.waits<>0) THEN NEW.ready:=clock_ms(); END IF;"
     " RETURN NEW; END $$;"
     "DROP TRIGGER job_changes ON job;"
-    "CREATE TRIGGER job_changes BEFORE UPDATE OF state, waits ON job FOR EACH ROW EXECUTE FUNCTION job_changes();",
+    "CREATE TRIGGER job_changes BEFORE UPDATE OF state, waits ON job FOR EACH ROW EXECUTE FUNCTION job_changes();"
+    /* An owner's jobs of one kind, in the order of claims; and whether a suspect waits. */
+    "DROP INDEX job_ready;"
+    "CREATE INDEX job_computes ON job(owner, priority DESC, seq) WHERE state=0 AND waits=0 AND kind<>2;"
+    "CREATE INDEX job_fetches ON job(owner, priority DESC, seq) WHERE state=0 AND waits=0 AND kind=2;"
+    "CREATE INDEX job_suspects ON job(seq) WHERE state=0 AND waits=0 AND suspect=1;",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];
