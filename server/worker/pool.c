@@ -168,7 +168,8 @@ static void report(const job *j, int fine, double seconds) {
 
 /* In a word, for its span. */
 static const char *why_failed(orb_context *ctx, const api_problem *problem) {
-  return problem->name ? problem->name : orb_status_name(orb_context_error(ctx)->status);
+  const orb_status status = orb_context_error(ctx)->status;
+  return problem->name ? problem->name : status != ORB_OK ? orb_status_name(status) : "given back";
 }
 
 static void fetch_one(worker_pool *pool, job *j, job_spans *spans) {

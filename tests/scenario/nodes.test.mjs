@@ -13,6 +13,7 @@ import test from 'node:test';
 import { Collector } from './support/collector.mjs';
 import { assertProblem, Daemon, endless, patience, samples, until } from './support/daemon.mjs';
 import { haproxy, lacksHaproxy } from './support/haproxy.mjs';
+import { busy, half, late, lost, pass, s3Proxy } from './support/s3_proxy.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const program = process.env.ORB_DAEMON; // that starts with a catalogue and objects of its own
@@ -45,7 +46,8 @@ class Cluster {
   constructor(t) {
     const name = `cluster${process.pid}-${++Cluster.count}`;
     this.catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
-    this.objects = `s3://objects/${name}?endpoint=${process.env.ORB_S3}`;
+    this.bucket = `s3://objects/${name}?endpoint=${process.env.ORB_S3}`;
+    this.objects = this.bucket; // as nodes reach it
     t.after(() => this.end());
   }
 
@@ -70,9 +72,8 @@ class Cluster {
   }
 
   sql(text) {
-    const set = `SET search_path=${/search_path%3D(\w+)/.exec(this.catalogue)[1]};`;
-    return execFileSync('psql', ['-X', '-qAt', '-v', 'ON_ERROR_STOP=1', '-d', process.env.ORB_POSTGRESQL], {
-      input: set + text,
+    return execFileSync('psql', ['-X', '-qAt', '-v', 'ON_ERROR_STOP=1', '-d', this.catalogue], {
+      input: text,
       encoding: 'utf8',
     }).trim();
   }
@@ -94,7 +95,7 @@ class Cluster {
   /** Every row has its object, and every object its row, but for what a node that died had just uploaded. */
   async check() {
     const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
-    const args = ['--check-data', '--data', data, '--catalogue', this.catalogue, '--objects', this.objects];
+    const args = ['--check-data', '--data', data, '--catalogue', this.catalogue, '--objects', this.bucket];
     const found = spawnSync(program, args, { encoding: 'utf8', timeout: 120_000 * patience });
     await rm(data, { recursive: true });
     assert.equal(found.status, 0, found.stdout + found.stderr);
@@ -324,6 +325,7 @@ test('while PostgreSQL is away, requests get 503 and running jobs lose nothing',
   const done = await a.ended(json);
   assert.equal(done.state, 'succeeded');
   assert.equal(done.attempt, 1);
+  assert.equal(a.log.match(/supermesh job done/g).length, 1); // what it made was not made again
   c.cut();
   assert.equal((await a.upload(newMesh())).status, 201);
   await c.check();
@@ -367,6 +369,8 @@ class Ledger {
 
 test('no chaos loses an accepted job, or changes what it made', async (t) => {
   const c = new Cluster(t);
+  const proxy = await s3Proxy(t, process.env.ORB_S3, () => pass);
+  c.objects = c.bucket.replace(process.env.ORB_S3, proxy.url);
   const serve = [await c.node('--workers', '1'), await c.node('--workers', '1')];
   const work = await c.node('--role', 'work', '--workers', '1');
   const all = [...serve, work];
@@ -395,6 +399,12 @@ test('no chaos loses an accepted job, or changes what it made', async (t) => {
       await sleep(300);
       s3 = Number(execFileSync(process.env.ORB_S3_START, { encoding: 'utf8' }));
       await until(() => fetch(process.env.ORB_S3).catch(() => 0), 'S3 is back', 60);
+    },
+    async answers() {
+      const troubles = [busy, half, lost, late, pass];
+      proxy.decide = () => troubles[random(troubles.length)];
+      await sleep(1000);
+      proxy.decide = () => pass;
     },
   };
   const order = Object.keys(actions);
