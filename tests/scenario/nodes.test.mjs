@@ -187,7 +187,8 @@ test('what one node accepts, others run and show', async (t) => {
 
   // Two nodes had part in it, and one trace has both.
   const of = (span) => span.trace === trace;
-  await until(() => traces.named('supermesh job', of).length > 0, 'the span of the job');
+  const names = ['POST /v1/supermeshes', 'embedding job', 'supermesh job'];
+  await until(() => names.every((name) => traces.named(name, of).length > 0), 'the spans of request and jobs');
   const [asked] = traces.named('POST /v1/supermeshes', of);
   const [ran] = traces.named('supermesh job', of);
   assert.equal(ran.parent, asked.id);
