@@ -75,9 +75,6 @@ static void write_tenants(catalogue *cat, api_text *text) {
 
 static void write_traces(api_text *text) {
   trace_numbers n;
-  if (!trace_is_on()) {
-    return;
-  }
   trace_count(&n);
   metrics_family(text, "orbmorph_spans_total", "counter", "Spans of traces, by what became of them.");
   api_text_printf(text, "orbmorph_spans_total{result=\"sent\"} %lld\norbmorph_spans_total{result=\"dropped\"} %lld\n",
