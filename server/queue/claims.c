@@ -152,6 +152,7 @@ static job *enter(queue *q, job_claim *c) {
   j->running = 1;
   j->cancel |= c->cancel;
   j->needs_all = c->big;
+  j->ready = c->ready;
   j->stage[0] = 0;
   j->last_event = c->last_event > j->last_event ? c->last_event : j->last_event;
   return j;

@@ -43,6 +43,7 @@ struct job {
   int is_guest;     /* see queue.h */
   int64_t memory;   /* taken from the budget; 0: none */
   int needs_all;    /* of the memory that jobs may have */
+  int64_t ready;    /* since when it could be taken, Unix time in ms */
   int64_t retry_at; /* not chosen before this time, orb_clock_ms() */
   orb_context *ctx;
   int64_t last_event, last_event_ms, stored_event_ms;

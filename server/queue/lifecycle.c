@@ -79,6 +79,7 @@ static store_result load(queue *q, job_row *row) {
     return STORE_ERROR;
   }
   j->row = *row;
+  j->ready = unix_ms();
   j->refs = 1;
   j->committed = 1;
   /* New events continue after the numbers of the stored ones. */

@@ -186,6 +186,7 @@ void schedule_leave(queue *q, job *j) {
   j->taken = 0;
   j->running = 0;
   j->ctx = NULL;
+  j->ready = unix_ms();
   if (q->shared) {
     shared_look(q);
   }
@@ -228,6 +229,20 @@ void queue_set_context(queue *q, job *j, orb_context *ctx) {
     orb_context_cancel(ctx);
   }
   pthread_mutex_unlock(&q->lock);
+}
+
+int64_t queue_ready_ms(queue *q, const job *j) {
+  pthread_mutex_lock(&q->lock);
+  int64_t ready = j->ready;
+  pthread_mutex_unlock(&q->lock);
+  return ready;
+}
+
+int queue_attempt(queue *q, const job *j) {
+  pthread_mutex_lock(&q->lock);
+  int attempt = j->row.attempt;
+  pthread_mutex_unlock(&q->lock);
+  return attempt;
 }
 
 int queue_cancel_wanted(queue *q, job *j) {

@@ -76,7 +76,8 @@ job *job_create(queue *q, const queue_request *request) {
   j->row.cost = request->cost;
   j->row.priority = request->priority;
   j->row.listed = request->listed;
-  j->row.created = unix_ms();
+  j->row.created = j->ready = unix_ms();
+  copy_text(j->row.trace, sizeof j->row.trace, request->trace ? request->trace : "");
   api_random_id(j->row.id);
   copy_text(j->row.key, sizeof j->row.key, request->key);
   copy_text(j->row.owner, sizeof j->row.owner, request->owner);
@@ -177,6 +178,9 @@ const char *job_key(const job *j) {
 }
 api_job_kind job_kind(const job *j) {
   return j->row.kind;
+}
+const char *job_trace(const job *j) {
+  return j->row.trace;
 }
 const char *job_charged(const job *j) {
   return j->row.charged;

@@ -26,7 +26,7 @@ static int insert(database *db, void *arg) {
   sql_statement *st = database_statement(
       db,
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
-      " charged) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10)");
+      " charged, trace) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)");
   if (!st) {
     return SQL_ERROR;
   }
@@ -40,6 +40,7 @@ static int insert(database *db, void *arg) {
   sql_bind_text(st, 8, r->request);
   sql_bind_integer(st, 9, r->created);
   sql_bind_text(st, 10, r->charged);
+  sql_bind_text(st, 11, r->trace);
   int code = crash_check(db, r->key);
   code = code == SQL_OK ? database_run(db, st) : code;
   r->seq = code == SQL_OK ? sql_last_row(db) : 0;
@@ -183,7 +184,7 @@ static int finish(database *db, void *arg) {
 
 store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, const job_end *end) {
   change c = {.id = id, .attempt = attempt, .end = end};
-  return catalogue_write(cat, finish, &c);
+  return end->result ? catalogue_write_held(cat, finish, &c) : catalogue_write(cat, finish, &c);
 }
 
 static int read_row(sql_statement *st, void *to) {
@@ -209,6 +210,7 @@ static int read_row(sql_statement *st, void *to) {
   out->finished = sql_integer(st, 17);
   row_text(st, 18, out->charged, sizeof out->charged);
   row_text(st, 19, out->result, sizeof out->result);
+  row_text(st, 20, out->trace, sizeof out->trace);
   return out->request != NULL && !row_lacks(st, 14, out->problem);
 }
 static void release_row(void *row) {

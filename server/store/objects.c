@@ -245,8 +245,7 @@ void objects_share(objects *store, object_lock *lock) {
   store->nodes = lock;
 }
 
-/* Without the database no row is committed, so nothing is lost if the lock cannot be taken: a job that publishes
- * ends only when the database is back, and nobody deletes an object that no row has named. */
+/* If the lock cannot be taken, because the database is away, the commit of the row will fail: object_lock_check(). */
 void objects_hold(objects *store) {
   pthread_rwlock_rdlock(&store->publishing);
   if (store->nodes) {
@@ -267,6 +266,10 @@ void objects_let_go(objects *store) {
   }
   store->excludes = 0; /* set only while one thread has the lock alone */
   pthread_rwlock_unlock(&store->publishing);
+}
+void objects_hold_again(objects *store) {
+  objects_let_go(store);
+  objects_hold(store);
 }
 int objects_still_excludes(objects *store) {
   return store->excluded && (!store->nodes || object_lock_holds(store->nodes));

@@ -69,8 +69,10 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
 /* An object without a row is harmless; a row without its object is damage. So a thread that publishes objects and then
  * commits their row calls objects_hold() first; any number of threads may hold at once. A thread that deletes a row and
  * then its objects calls objects_exclude() first, which waits for all holders. The same thread calls objects_let_go()
- * afterwards. */
+ * afterwards. Among nodes, the hold may be lost with a connection: then the commit of the row fails with STORE_LOST. */
 void objects_hold(objects *store);
+/* After STORE_LOST: holds anew. What was published before may have been deleted: objects_look() tells. */
+void objects_hold_again(objects *store);
 /* 0: nodes that share the bucket could not be excluded; nothing may be deleted. */
 int objects_exclude(objects *store);
 void objects_let_go(objects *store);

@@ -30,7 +30,7 @@ typedef struct row_kind {
 #define JOB_COLUMNS_WITH(state)                                                          \
   "seq, id, key, kind, " state                                                           \
   ", attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
-  " created, started, finished, charged, result"
+  " created, started, finished, charged, result, trace"
 extern const row_kind job_rows;
 extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created,
                                       * places, quantized, meshopt */

@@ -27,6 +27,7 @@ typedef struct job_claim {
   job_row row;
   int64_t last_event; /* number */
   int big, cancel;
+  int64_t ready;  /* since when it could be claimed, Unix time in ms of the database's clock */
   int64_t beside; /* jobs that are ready to run, too */
 } job_claim;
 /* Claims the next job. STORE_NOT_FOUND: there is none for this node. */

@@ -18,6 +18,7 @@ enum sql_code {
   SQL_ERROR,
   SQL_CONSTRAINT, /* a condition failed: of the schema, or of the caller */
   SQL_NOTFOUND,   /* only callers return it: there is no such row */
+  SQL_LOST,       /* only callers return it: see object_lock_check() */
   SQL_NOMEM,
   SQL_FULL,
   SQL_IOERR,

@@ -55,7 +55,7 @@ static void pass(queue *q, job *j, int64_t ms) {
 static void end_after(queue *q, job *j, int64_t ms) {
   assert_int_equal(queue_claim(q, j), STORE_OK);
   pass(q, j, ms);
-  queue_finish(q, j, API_JOB_CANCELLED, NULL, NULL);
+  queue_finish(q, j, API_JOB_CANCELLED, NULL);
 }
 
 /* Every mesh is as large as the others, but those of one owner take ten times as long. */
