@@ -19,7 +19,7 @@ static queue_result result_of(store_result stored, submit_outcome outcome) {
                                      : QUEUE_ERROR;
 }
 
-/* The job of a request in memory before its row is committed, so that no notice about it comes too early. */
+/* Puts the job of a request into memory before its row is committed, so that a notice about it finds the job. */
 static job *prepare(queue *q, const queue_request *request) {
   pthread_mutex_lock(&q->lock);
   job *j = q->stopping ? NULL : job_create(q, request);
@@ -27,7 +27,8 @@ static job *prepare(queue *q, const queue_request *request) {
   return j;
 }
 
-/* Drops a job whose row was not inserted. It may be there nevertheless, if the connection was lost at its commit. */
+/* Drops a job whose row was not inserted. The row may be there nevertheless, if the connection was lost at the commit.
+ */
 static void withdraw(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
   if (j->taken || api_job_ended(j->row.state)) {
@@ -40,7 +41,7 @@ static void withdraw(queue *q, job *j) {
   pthread_mutex_unlock(&q->lock);
 }
 
-/* *again: a job of the same request was there, and is not any more. */
+/* *again: the job of the same request ended just now, so another try finds its result. */
 static queue_result submit_once(queue *q, const queue_request *request, job **out, int *fresh, int *again) {
   const int stopping = q->stopping;
   job *j = prepare(q, request);
@@ -84,7 +85,7 @@ queue_result shared_submit(queue *q, const queue_request *request, job **out, in
   enum { TRIES = 3 };
   int again = 1;
   queue_result result = QUEUE_ERROR;
-  for (int i = 0; i < TRIES && again; i++) { /* it has just ended: the next look finds the result */
+  for (int i = 0; i < TRIES && again; i++) {
     result = submit_once(q, request, out, fresh, &again);
   }
   return again ? QUEUE_ERROR : result;
@@ -157,14 +158,7 @@ static job *enter(queue *q, job_claim *c) {
   return j;
 }
 
-static int share_of_cores(const queue *q, const job *j, int64_t beside) {
-  const int64_t wanted = q->running - q->fetching + beside; /* j is among those that run */
-  const int64_t most = wanted < q->options.workers ? wanted : q->options.workers;
-  const int share = most > 0 ? (int)most : 1;
-  return j->is_guest || q->options.cores / share < 1 ? 1 : q->options.cores / share;
-}
-
-/* Gives a claim back. The lock is held, but not meanwhile. */
+/* Gives a claim back, and releases the lock for that time. */
 static job *refuse(queue *q, job_claim *c) {
   pthread_mutex_unlock(&q->lock);
   store_result stored = catalogue_job_release(q->cat, c->row.id, c->row.attempt);
@@ -177,7 +171,7 @@ static job *refuse(queue *q, job_claim *c) {
   return NULL;
 }
 
-/* Asks the catalogue for a job; without the lock meanwhile. NULL: there is none. */
+/* Asks the catalogue for a job, and releases the lock for that time. NULL: there is none. */
 static job *claim(queue *q, queue_lane lane, const claim_wish *wish, int *threads) {
   sharing *s = q->shared;
   job_claim claimed;
@@ -202,7 +196,7 @@ static job *claim(queue *q, queue_lane lane, const claim_wish *wish, int *thread
   }
   schedule_enter(q, lane, j, orb_clock_ms());
   int fits = schedule_take_memory(q, lane, j);
-  *threads = share_of_cores(q, j, claimed.beside);
+  *threads = schedule_threads(q, j, claimed.beside);
   s->look[lane] = 1; /* there may be more */
   pthread_cond_broadcast(&q->work);
   if (fits && !q->stopping) {
