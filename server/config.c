@@ -46,7 +46,7 @@ static const entry table[] = {
      "15 minutes"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
     {"role", TEXT(role), "all",
-     "of a node that shares its catalogue with others; serve: runs no jobs; work: runs jobs and has no port"},
+     "what a node does that shares its catalogue with others: serve (runs no jobs), work (has no port), or all"},
     {"lease-seconds", NUMBER(lease_seconds, 2, 3600), "30",
      "other nodes take over the jobs of a node that is silent for this long"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
