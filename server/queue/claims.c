@@ -127,17 +127,29 @@ static int may_claim(const queue *q, queue_lane lane, claim_wish *wish) {
   return (!q->exclusive || q->isolated) && wish->most_cost >= 0;
 }
 
+/* Takes what a claimed row says into a job that is in memory already. Id, key, owner and request are the same, and
+ * threads that hold the job read them without the lock. */
+static void update_row(job_row *known, const job_row *claimed) {
+  known->seq = claimed->seq;
+  known->attempt = claimed->attempt;
+  known->crashes = claimed->crashes;
+  known->suspect = claimed->suspect;
+  known->alone = claimed->alone;
+  known->listed = claimed->listed;
+  known->priority = claimed->priority;
+  known->started = claimed->started;
+}
+
 /* The job in memory of a claim; takes over the row. NULL: out of memory. */
 static job *enter(queue *q, job_claim *c) {
   job *j = table_with_id(q, c->row.id);
   char *problem = c->row.problem; /* of a job that it waited for */
   c->row.problem = NULL;
   if (j) {
-    char *request = j->row.request;
+    update_row(&j->row, &c->row);
     free(c->row.request);
     free(j->row.problem);
-    j->row = c->row;
-    j->row.request = request;
+    j->row.problem = NULL;
   } else if ((j = calloc(1, sizeof *j))) {
     j->refs = 1;
     j->row = c->row;

@@ -193,7 +193,9 @@ void objects_let_go(objects *store) {
   } else if (store->nodes && store->excluded) {
     object_lock_let_go(store->nodes);
   }
-  store->excludes = 0; /* set only while one thread has the lock alone */
+  if (store->excludes) { /* only of a thread that has the lock alone; others must not write it */
+    store->excludes = 0;
+  }
   pthread_rwlock_unlock(&store->publishing);
 }
 int objects_still_excludes(objects *store) {
