@@ -266,7 +266,7 @@ export type SupermeshRequest = {
     /** Names of nodes: the meshes that they and the nodes below them show. */
     nodes?: string[];
   };
-  /** What the asset gets from the shapes besides their surfaces, at the same places: the skin with its skeleton; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) if a shape does not have what is asked of it. `transferred` of the supermesh lists what the asset got. An asset that got anything but targets has the profile float only. */
+  /** What the asset gets from the shapes besides their surfaces, at the same places: the skin with its skeleton, fitted to the first shape, and its animations; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) if a shape does not have what is asked of it. `transferred` of the supermesh lists what the asset got. An asset that got anything but targets has the profile float only. */
   transfer?: Array<{
     /** The shape, from 0 in their order. */
     from: number;

@@ -219,8 +219,8 @@ const ops = {
     return { lines, points, triangles: Float32Array.from(flat), found };
   },
 
-  async morph(key: string, buffer: ArrayBuffer, shapeCount: number): Promise<MorphData> {
-    const data = decodeMorph(buffer, shapeCount);
+  async morph(key: string, buffer: ArrayBuffer, shapeCount: number, look = 0): Promise<MorphData> {
+    const data = decodeMorph(buffer, shapeCount, look);
     morphs.clear();
     morphs.set(key, {
       ...data,
