@@ -46,7 +46,7 @@ static const entry table[] = {
      "15 minutes"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
     {"role", TEXT(role), "all",
-     "of a node that shares its catalogue with others; serve: runs no jobs; work: runs jobs and serves no requests"},
+     "what a node does that shares its catalogue with others: serve (runs no jobs), work (serves no requests), or all"},
     {"metrics-listen", TEXT(metrics_listen), "",
      "of the role work: where it answers /metrics, /livez and /readyz, and nothing else; as listen; without it: "
      "nowhere"},

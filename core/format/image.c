@@ -14,7 +14,7 @@
 #include "base/memory.h"
 
 static orb_status unreadable(orb_context *ctx) {
-  return orb_fail(ctx, ORB_E_CORRUPT, "The image is no PNG or JPEG that can be read.");
+  return orb_fail(ctx, ORB_E_CORRUPT, "The image cannot be read as PNG or JPEG.");
 }
 
 static orb_status allocate(orb_context *ctx, size_t width, size_t height, orb_pixels *out) {

@@ -164,6 +164,12 @@ void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now) {
   q->exclusive |= j->row.suspect;
 }
 
+int schedule_threads(const queue *q, const job *j, int64_t beside) {
+  const int64_t others = q->running - q->fetching - !fetches(j), wanted = 1 + others + beside;
+  const int64_t share = wanted < q->options.workers ? wanted : q->options.workers;
+  return j->is_guest || q->options.cores < share ? 1 : q->options.cores / (int)share;
+}
+
 int schedule_beside(const queue *q, const job *chosen, int64_t now) {
   int beside = 0;
   for (const job *other = q->first; other; other = other->next) {

@@ -132,11 +132,8 @@ void job_unref(job *j) {
 
 job *queue_find(queue *q, const char *id) {
   pthread_mutex_lock(&q->lock);
-  job *j = q->by_id[bucket(id)];
-  while (j && (strcmp(j->row.id, id) != 0 || !j->committed)) {
-    j = j->next_id;
-  }
-  if (j && q->shared && !j->taken && !api_job_ended(j->row.state)) {
+  job *j = table_with_id(q, id);
+  if (j && (!j->committed || (q->shared && !j->taken && !api_job_ended(j->row.state)))) {
     j = NULL;
   }
   if (j) {

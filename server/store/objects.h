@@ -17,19 +17,8 @@
 #include <stdint.h>
 
 #include "store/bucket.h"
+#include "store/object_files.h"
 #include "store/result.h"
-
-typedef enum object_kind {
-  OBJECT_MESH,
-  OBJECT_SPHERE,
-  OBJECT_ASSET,
-  OBJECT_PLACES,
-  OBJECT_SPHERES,   /* aligned spheres of a supermesh, see store/spheres.h */
-  OBJECT_QUANTIZED, /* profiles of an asset */
-  OBJECT_MESHOPT,
-  OBJECT_ALIGNMENT, /* see store/alignments.h */
-  OBJECT_KINDS
-} object_kind;
 
 typedef struct objects objects;
 

@@ -2,9 +2,7 @@
 
 #include <stdlib.h>
 
-#include "store/crashes.h"
 #include "store/deliveries.h"
-#include "store/owners.h"
 #include "store/rows.h"
 
 /* Estimate of a job's time, charged until it is known: as queue/schedule.c does within a process. */
@@ -142,31 +140,6 @@ store_result catalogue_claim_next(catalogue *cat, const claim_wish *wish, job_cl
   return result;
 }
 
-static int insert_job(database *db, job_row *r) {
-  sql_statement *st = database_statement(
-      db,
-      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
-      " charged, trace) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) RETURNING seq");
-  if (!st) {
-    return SQL_ERROR;
-  }
-  sql_bind_text(st, 1, r->id);
-  sql_bind_text(st, 2, r->key);
-  sql_bind_integer(st, 3, (int)r->kind);
-  sql_bind_integer(st, 4, r->listed);
-  sql_bind_integer(st, 5, r->priority);
-  sql_bind_integer(st, 6, r->cost);
-  sql_bind_text(st, 7, r->owner);
-  sql_bind_text(st, 8, r->request);
-  sql_bind_integer(st, 9, r->created);
-  sql_bind_text(st, 10, r->charged);
-  sql_bind_text(st, 11, r->trace);
-  int code = sql_step(st);
-  r->seq = code == SQL_ROW ? sql_integer(st, 0) : 0;
-  sql_reset(st);
-  return code == SQL_ROW ? SQL_OK : code;
-}
-
 static int find_same(database *db, const char *key, const char *owner, char id[API_JOB_ID_SIZE]) {
   sql_statement *st = database_statement(
       db, "SELECT id FROM job WHERE key=?1 AND owner=?2 AND state<2 AND cancel=0 ORDER BY seq LIMIT 1");
@@ -238,13 +211,7 @@ static int submit(database *db, void *arg) {
   }
   memcpy(r->id, a->id, sizeof r->id);
   code = code == SQL_NOTFOUND ? check_limits(db, s) : code;
-  if (code != SQL_OK || s->outcome != SUBMIT_FRESH) {
-    return code;
-  }
-  code = crash_check(db, r->key);
-  code = code == SQL_OK ? insert_job(db, r) : code;
-  code = code == SQL_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
-  return code == SQL_OK && s->hook ? delivery_subscribe(db, r->id, s->hook) : code;
+  return code == SQL_OK && s->outcome == SUBMIT_FRESH ? job_insert(db, r, s->hook) : code;
 }
 
 store_result catalogue_job_submit(catalogue *cat, job_submission *s) {
@@ -265,9 +232,7 @@ static int need_one(database *db, const job_needs *n, int i) {
     memcpy(row.charged, n->row->charged, sizeof row.charged);
     memcpy(row.trace, n->row->trace, sizeof row.trace);
     row.request = (char *)(uintptr_t)n->requests[i];
-    code = crash_check(db, row.key);
-    code = code == SQL_OK ? insert_job(db, &row) : code;
-    code = code == SQL_OK ? owner_of_meshes(db, row.request, row.owner, row.created, 0) : code;
+    code = job_insert(db, &row, NULL);
   }
   sql_statement *st = code == SQL_OK ? database_statement(db,
                                                           "INSERT INTO need(job, key, owner) VALUES(?1, ?2, ?3)"

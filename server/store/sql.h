@@ -60,8 +60,7 @@ typedef struct sql_driver {
   int (*version)(sql_connection *c, int *version); /* of the schema; 0: there is none */
   /* Of the connection that writes, once its schema is up to date. */
   int (*hold)(sql_connection *c);
-  int64_t (*changes)(const sql_connection *c);  /* rows that the last INSERT, UPDATE or DELETE changed */
-  int64_t (*last_row)(const sql_connection *c); /* the sequence number that the last INSERT chose */
+  int64_t (*changes)(const sql_connection *c); /* rows that the last INSERT, UPDATE or DELETE changed */
 
   int (*prepare)(sql_connection *c, const char *sql, sql_statement *out);
   void (*finish)(sql_statement *st); /* before the connection is closed */

@@ -219,24 +219,36 @@ static int is_waiting(nodes *n, const char *id, job_mark *mark) {
   return mark->queued;
 }
 
+/* The first node's job of this row waits for one whose key has digit 2. */
+static store_result wait_for_2(nodes *n, const job_row *row) {
+  char keys[1][API_ID_SIZE];
+  const char *const requests[] = {"{}"};
+  const int64_t costs[] = {5};
+  fill(keys[0], '2');
+  const job_needs needs = {.row = row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
+  return catalogue_job_wait(n->cat[0], &needs);
+}
+
+/* Claims a job whose key has this digit. */
+static void claim_key(nodes *n, int node, char digit, job_claim *out) {
+  char key[API_ID_SIZE];
+  fill(key, digit);
+  assert_int_equal(claim(n, node, out), STORE_OK);
+  assert_string_equal(out->row.key, key);
+}
+
 static void test_needs(void **state) {
   nodes *n = *state;
   job_row row;
   job_claim whole, part;
   job_mark mark;
-  char keys[1][API_ID_SIZE];
-  const char *const requests[] = {"{}"};
-  const int64_t costs[] = {5};
   submit(n, 0, "ann", '1', 0, &row);
-  assert_int_equal(claim(n, 0, &whole), STORE_OK);
-  fill(keys[0], '2');
-  const job_needs needs = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
-  assert_int_equal(catalogue_job_wait(n->cat[0], &needs), STORE_OK);
+  claim_key(n, 0, '1', &whole);
+  assert_int_equal(wait_for_2(n, &whole.row), STORE_OK);
   assert_true(is_waiting(n, row.id, &mark));
   assert_int_equal(mark.state, API_JOB_QUEUED);
   assert_int_equal(mark.attempt, 0); /* that attempt does not count */
-  assert_int_equal(claim(n, 1, &part), STORE_OK);
-  assert_string_equal(part.row.key, keys[0]);
+  claim_key(n, 1, '2', &part);
   assert_true(is_waiting(n, row.id, &mark));
   assert_int_equal(mark.state, API_JOB_RUNNING); /* as callers see it */
   job_claim none;
@@ -247,30 +259,23 @@ static void test_needs(void **state) {
   assert_int_equal(whole.row.attempt, 1);
 }
 
-/* Cancelling who waits also cancels what only he needs. */
+/* Cancelling a job that waits also cancels the jobs that it alone needs. */
 static void test_cancel(void **state) {
   nodes *n = *state;
   job_row row;
   job_claim whole, part;
-  char keys[1][API_ID_SIZE];
-  const char *const requests[] = {"{}"};
-  const int64_t costs[] = {5};
   submit(n, 0, "ann", '1', 0, &row);
-  assert_int_equal(claim(n, 0, &whole), STORE_OK);
-  fill(keys[0], '2');
-  const job_needs needs = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
-  assert_int_equal(catalogue_job_wait(n->cat[0], &needs), STORE_OK);
+  claim_key(n, 0, '1', &whole);
+  assert_int_equal(wait_for_2(n, &whole.row), STORE_OK);
   assert_int_equal(catalogue_job_cancel(n->cat[1], row.id), STORE_OK);
   whole.row.attempt = 0;
   assert_int_equal(finish(n, 1, &whole, API_JOB_CANCELLED, NULL), STORE_OK);
-  assert_int_equal(claim(n, 1, &part), STORE_OK);
-  assert_string_equal(part.row.key, keys[0]);
+  claim_key(n, 1, '2', &part);
   assert_true(part.cancel);
   submit(n, 0, "ann", '3', 0, &row);
-  assert_int_equal(claim(n, 0, &whole), STORE_OK);
+  claim_key(n, 0, '3', &whole);
   assert_int_equal(catalogue_job_cancel(n->cat[1], row.id), STORE_OK);
-  const job_needs late = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
-  assert_int_equal(catalogue_job_wait(n->cat[0], &late), STORE_CONFLICT);
+  assert_int_equal(wait_for_2(n, &whole.row), STORE_CONFLICT);
 }
 
 static void note(void *user, const char *text) {

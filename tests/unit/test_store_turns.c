@@ -208,7 +208,7 @@ static void sleep_ms(int ms) {
 
 static void note(task *t) {
   noted *n = (noted *)(void *)t;
-  n->at = (*n->next)++;
+  n->at = __atomic_fetch_add(n->next, 1, __ATOMIC_RELAXED); /* another thread may read it meanwhile */
   sleep_ms(n->ms);
 }
 
