@@ -266,6 +266,7 @@ static void write_match(const orb_match_facts *match, api_text *out) {
                          : match->confidence >= LIKELY ? "likely"
                                                        : "unsure");
   api_json_member_number(out, "clear", match->clear);
+  api_json_member_number(out, "lead", match->lead);
   api_json_member_number(out, "bend", match->bend);
   api_json_close(out, '}');
 }

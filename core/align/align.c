@@ -113,7 +113,7 @@ static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, cons
   }
   const double clear = out->match.clear;
   if (out->match.is_measured) {
-    out->match.confidence = orb_match_confidence(out->match.bend, clear, out->energy);
+    out->match.confidence = orb_match_confidence(out->match.bend, clear, out->match.lead, out->energy);
   } else {
     memset(&out->match, 0, sizeof out->match);
   }

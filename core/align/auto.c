@@ -28,7 +28,7 @@ typedef struct matches {
   const double **targets; /* likewise */
   int32_t count;          /* vertices of the first shape that all matches pair */
   int32_t *vertex;        /* these, and their partners: ORB_MATCH_PAIRS a shape */
-  double clear;           /* least over the shapes */
+  double clear, lead;     /* least over the shapes */
   double bend;            /* most over the shapes */
   int are_found;          /* all of them */
 } matches;
@@ -61,7 +61,7 @@ static void gather(matches *m) {
 }
 
 static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, matches *m) {
-  *m = (matches){.shape_count = shape_count, .clear = 1, .are_found = 1};
+  *m = (matches){.shape_count = shape_count, .clear = 1, .lead = INFINITY, .are_found = 1};
   m->of = ORB_NEW0(ctx, orb_match, shape_count);
   m->targets = ORB_NEW0(ctx, const double *, shape_count);
   m->vertex = ORB_NEW(ctx, int32_t, ORB_MATCH_PAIRS * (size_t)shape_count);
@@ -73,6 +73,7 @@ static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, 
     m->targets[s] = m->of[s].target;
     m->are_found = m->are_found && m->of[s].is_found;
     m->clear = fmin(m->clear, m->of[s].clear);
+    m->lead = fmin(m->lead, m->of[s].lead);
     m->bend = fmax(m->bend, m->of[s].bend);
   }
   gather(m);
@@ -205,6 +206,7 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
   ORB_TRY(orb_match_choose(ctx, &m->of[1], 0, target, clear));
   m->targets[1] = m->of[1].target;
   m->clear = m->of[1].clear;
+  m->lead = m->of[1].lead;
   m->bend = m->of[1].bend;
   gather(m);
   return ORB_OK;
@@ -355,6 +357,7 @@ static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shap
   }
   out->match.is_measured = 1;
   out->match.bend = m->bend;
+  out->match.lead = m->lead;
   return write_alternatives(ctx, shapes, m, out);
 }
 

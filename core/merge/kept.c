@@ -21,11 +21,11 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { VERSION = 4, BYTE_ORDER_MARK = 0x01020304 };
+enum { VERSION = 5, BYTE_ORDER_MARK = 0x01020304 };
 static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 
 /* A new member of the alignment must be written and read here, with a new VERSION. */
-_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 120, "write and read the new member");
+_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 128, "write and read the new member");
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
                "write and read the new member");
 
@@ -147,6 +147,7 @@ static void put_match(writer *w, const orb_alignment *a) {
   if (a->match.is_measured) {
     put(w, &a->match.bend, sizeof a->match.bend);
     put(w, &a->match.clear, sizeof a->match.clear);
+    put(w, &a->match.lead, sizeof a->match.lead);
     put(w, &a->match.confidence, sizeof a->match.confidence);
   }
   put_integer(w, a->alternative_count);
@@ -363,6 +364,7 @@ static orb_status take_match(orb_context *ctx, reader *r, const orb_align_shape 
   if (out->match.is_measured) {
     take(r, &out->match.bend, sizeof out->match.bend);
     take(r, &out->match.clear, sizeof out->match.clear);
+    take(r, &out->match.lead, sizeof out->match.lead);
     take(r, &out->match.confidence, sizeof out->match.confidence);
   }
   const int32_t count = take_integer(r, 0, out->shape_count > 1 ? ORB_ALTERNATIVES_MAX : 0);

@@ -13,6 +13,9 @@ static const double FLAT = 1e-3;
 /* AUTO: frames clearly differ beyond any of these. Units (of powers of ten, inches) differ by 2.54 or more and axes by
  * 90°; shapes that were modelled in one frame rarely differ by this much. */
 static const double SCALE_DIFFERS = 1.5, DEGREES_DIFFER = 30, DIAGONALS_DIFFER = 0.5;
+/* AUTO: a shape keeps its posture where that makes the sum of squared distances at most this many times as large: of a
+ * dog and a giraffe 1.5 (15°), of an armadillo and a penguin 1.4 (21°). Copies of one shape have no such distances. */
+static const double POSTURE_WORSE = 2;
 
 /* Weighted points of both shapes. index NULL: all vertices; weight NULL: 1. */
 typedef struct fit_points {
@@ -83,6 +86,54 @@ static void add_areas(const orb_supermesh *supermesh, const double *positions, d
   }
 }
 
+/* Σ w b·Ra. */
+static double overlap(double rotation[3][3], double h[3][3]) {
+  double sum = 0;
+  for (int r = 0; r < 3; r++) {
+    for (int c = 0; c < 3; c++) {
+      sum += rotation[r][c] * h[c][r];
+    }
+  }
+  return sum;
+}
+
+/* The rotation by right angles that is nearest to a rotation: of the 24 that carry the axes onto axes. */
+static void nearest_right_angles(double rotation[3][3], double out[3][3]) {
+  static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
+  double most = -INFINITY;
+  for (int k = 0; k < 24; k++) {
+    const int *axis = order[k / 4], odd = k >= 12;
+    double sign[3] = {k & 1 ? -1 : 1, k & 2 ? -1 : 1, 1}, sum = 0;
+    sign[2] = sign[0] * sign[1] * (odd ? -1 : 1);
+    for (int r = 0; r < 3; r++) {
+      sum += sign[r] * rotation[r][axis[r]];
+    }
+    if (sum > most) {
+      most = sum;
+      memset(out, 0, 9 * sizeof(double));
+      for (int r = 0; r < 3; r++) {
+        out[r][axis[r]] = sign[r];
+      }
+    }
+  }
+}
+
+/* The axes of files differ by right angles. What a rotation has beyond these, if it is too little to be a difference of
+ * frames, comes from the shapes' postures: without it a shape stands as upright as in its file. Copies of one shape fit
+ * far worse without it, and keep their rotation. spread: Σ w b·b. */
+static void drop_posture(double rotation[3][3], double h[3][3], double scale, double spread) {
+  double right[3][3], trace = 0;
+  nearest_right_angles(rotation, right);
+  for (int i = 0; i < 9; i++) {
+    trace += right[i / 3][i % 3] * rotation[i / 3][i % 3];
+  }
+  const double degrees = acos(fmax(-1, fmin(1, (trace - 1) / 2))) * 180 / M_PI;
+  const double off = spread - scale * overlap(rotation, h), right_off = spread - scale * overlap(right, h);
+  if (degrees <= DEGREES_DIFFER && right_off <= POSTURE_WORSE * off) {
+    memcpy(rotation, right, sizeof right);
+  }
+}
+
 static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
   double fixed[3], moved[3], h[3][3] = {{0}}, spread_fixed = 0, spread_moved = 0, q[4], rotation[3][3];
   mean_of(points, points->fixed, fixed);
@@ -101,9 +152,12 @@ static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
   }
   orb_rotation_fit(h, q);
   orb_rotation_matrix(q, rotation);
-  memcpy(out->rotation, rotation, sizeof rotation);
-  out->moves = sqrt(orb_distance2(fixed, moved));
   out->scale = fit != ORB_FIT_RIGID && spread_moved > 0 && spread_fixed > 0 ? sqrt(spread_fixed / spread_moved) : 1;
+  out->moves = sqrt(orb_distance2(fixed, moved));
+  if (fit == ORB_FIT_AUTO) {
+    drop_posture(rotation, h, out->scale, spread_fixed);
+  }
+  memcpy(out->rotation, rotation, sizeof rotation);
   for (int c = 0; c < 3; c++) {
     out->shift[c] = fixed[c] - out->scale * orb_dot(out->rotation[c], moved);
   }

@@ -1,9 +1,9 @@
-// Drops meshes into the studio in pairs, as a visitor does: both show, morph with the fast preset, play and export.
+// Drops meshes into the studio in pairs, as a visitor does: both show, morph, play and export. Nothing is set.
 //
 //   node tests/long/visit.mjs FOLDER MESH MESH [MESH MESH…]
 //
-// Writes a picture of each pair (the shapes, then half the morph) and the contact sheet pairs.png into FOLDER. Exits
-// with 1 if a pair fails.
+// Writes pictures of each pair (the shapes; half the fast morph; half the default one, and its end) and the contact
+// sheet pairs.png into FOLDER. Exits with 1 if a pair fails.
 import assert from 'node:assert/strict';
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { basename, join } from 'node:path';
@@ -11,6 +11,7 @@ import {
   addFiles,
   button,
   countPixels,
+  defaultShown,
   openPage,
   settled,
   startBrowser,
@@ -44,18 +45,22 @@ async function visit(pair, pictures) {
   await addFiles(page, ...pair);
   assert.equal(await page.locator('.card.ready').count(), 2, 'both are accepted');
   await shoot();
+  const scrub = (value) =>
+    page.getByRole('slider', { name: 'Along the morph' }).evaluate((input, time) => {
+      input.value = time;
+      input.dispatchEvent(new Event('input', { bubbles: true }));
+    }, value);
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the fast morph plays', LIMIT);
-  await button(page, 'Cancel')
-    .click({ timeout: 2000 })
-    .catch(() => {}); // the default morph may be done already
   await button(page, 'Pause').click();
-  const scrubber = page.getByRole('slider', { name: 'Along the morph' });
-  await scrubber.evaluate((input) => {
-    input.value = '0.5';
-    input.dispatchEvent(new Event('input', { bubbles: true }));
-  });
+  await scrub('0.5');
   await shoot();
+  await defaultShown(page);
+  await shoot();
+  await scrub('1');
+  await shoot();
+  const verdict = page.getByRole('status', { name: 'How sure the match is' });
+  const said = (await verdict.count()) ? await verdict.innerText() : '';
   const [download] = await Promise.all([
     page.waitForEvent('download'),
     page.getByRole('link', { name: 'Download GLB' }).click(),
@@ -63,6 +68,7 @@ async function visit(pair, pictures) {
   const { gltf } = parseGlb(await readFile(await download.path()));
   assert.equal(gltf.meshes[0].primitives[0].targets.length, 1, 'a morph target');
   await done();
+  return said;
 }
 
 const rows = [];
@@ -72,18 +78,18 @@ for (let i = 0; i < files.length; i += 2) {
   const title = pair.map((file) => basename(file)).join(' – ');
   const pictures = [];
   const begin = performance.now();
-  const problem = await visit(pair, pictures).then(
-    () => null,
-    (error) => error.message.split('\n')[0],
+  const { said, problem } = await visit(pair, pictures).then(
+    (text) => ({ said: text }),
+    (error) => ({ problem: error.message.split('\n')[0] }),
   );
   failed += problem ? 1 : 0;
   console.log(
-    `${problem ? 'FAILED' : 'ok'} ${title} ${((performance.now() - begin) / 1000).toFixed(1)} s ${problem ?? ''}`,
+    `${problem ? 'FAILED' : 'ok'} ${title} ${((performance.now() - begin) / 1000).toFixed(1)} s ${problem ?? said}`,
   );
   for (const [k, picture] of pictures.entries()) await writeFile(join(folder, `${i / 2}-${k}.png`), picture);
   rows.push({ title: problem ? `${title}: ${problem}` : title, pictures: pictures.map((p) => p.toString('base64')) });
 }
-await writeFile(join(folder, 'pairs.png'), await sheet(browser, rows));
+await writeFile(join(folder, 'pairs.png'), await sheet(browser, rows, { across: 1 }));
 await browser.close();
 await daemon.stop();
 process.exit(failed ? 1 : 0);

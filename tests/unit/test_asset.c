@@ -336,6 +336,38 @@ static void auto_fits_what_clearly_differs(void **state) {
   }
 }
 
+/* A body, and another one of other proportions that leans forward, ten times as large, with z up. */
+static void leaning_copy(int32_t shape, const double p[3], double out[3]) {
+  double q[3] = {p[0], 1.2 * p[1], 0.5 * p[2]};
+  if (shape == 0) {
+    memcpy(out, q, sizeof q);
+    return;
+  }
+  q[2] *= 2;
+  q[0] = 0.6 * q[0] + 0.5 * q[1];
+  out[0] = 10 * q[0];
+  out[1] = -10 * q[2];
+  out[2] = 10 * q[1];
+}
+
+/* The best rotation of the leaning body would tip it over backwards. auto leaves its posture and turns it by the right
+ * angle between the files' axes; a similarity that is asked for is the best one. */
+static void auto_leaves_a_posture(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 3, 2, leaning_copy);
+  orb_fit_report reports[2];
+  double m[32];
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_AUTO, m, reports), ORB_OK);
+  assert_int_equal(reports[1].kind, ORB_FIT_SIMILARITY);
+  assert_true(fabs(reports[1].rotation_degrees - 90) < 1e-6);
+  for (int k = 0; k < 3; k++) { /* z of its file becomes y */
+    assert_true(fabs(m[16 + 4 * 2 + k] / reports[1].scale - (k == 1)) < 1e-9);
+  }
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_SIMILARITY, m, reports), ORB_OK);
+  assert_true(m[16 + 4 * 2] / reports[1].scale < -0.1);
+  synthetic_free(ctx, &made);
+}
+
 /* The matrix of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
 static void the_transform_is_the_inverse(void **state) {
   orb_context *ctx = *state;
@@ -540,6 +572,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(hard_edges_split_vertices, setup, teardown),
       cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, setup, teardown),
       cmocka_unit_test_setup_teardown(fit_undoes_a_similarity, setup, teardown),
+      cmocka_unit_test_setup_teardown(auto_leaves_a_posture, setup, teardown),
       cmocka_unit_test_setup_teardown(the_transform_is_the_inverse, setup, teardown),
       cmocka_unit_test_setup_teardown(auto_fits_what_clearly_differs, setup, teardown),
       cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, setup, teardown),

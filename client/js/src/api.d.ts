@@ -248,7 +248,7 @@ export type SupermeshRequest = {
     normals?: boolean;
     /** Default: "pingpong". */
     animation?: 'pingpong' | 'none';
-    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none; `shapes[].fit` of the supermesh says which. Default: "auto". */
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files; `shapes[].fit` of the supermesh says which. Default: "auto". */
     fit?: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. Default: "linear". */
     path?: 'linear' | 'rigid';
@@ -319,7 +319,7 @@ export type CanonicalRequest = {
   asset: {
     normals: boolean;
     animation: 'pingpong' | 'none';
-    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none; `shapes[].fit` of the supermesh says which. */
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files; `shapes[].fit` of the supermesh says which. */
     fit: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. */
     path: 'linear' | 'rigid';
@@ -451,7 +451,7 @@ export type Supermesh = {
     /** The distance from its given place to there, relative to the diagonal. */
     distance_relative: number;
   }>;
-  /** How far you can rely on the correspondence that orbmorph found; with more than two shapes, bend and clear are each the worst of all maps. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
+  /** How far you can rely on the correspondence that orbmorph found; with more than two shapes, bend, clear and lead are each the worst of all maps. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
   match?: {
     /** From 0 to 1, calibrated on pairs of shapes: of the matches with 0.8 or more, all 41 were right. Lower values rank matches but are not probabilities. */
     confidence: number;
@@ -459,6 +459,8 @@ export type Supermesh = {
     verdict: 'sure' | 'likely' | 'unsure';
     /** From 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs. */
     clear: number;
+    /** How many times as much as the best rough map the nearest other one bends the shapes, half of their rotations in space counted. About 1 where a shape looks alike from several sides, so that no match can be told from the others; such a match is never `sure`. */
+    lead: number;
     /** How much the best rough map bends the shapes: 0 for a rigid motion. */
     bend: number;
   };

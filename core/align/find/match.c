@@ -313,11 +313,23 @@ static orb_status write_pairs(const search *t, const trial *one, orb_match_pairs
   return ORB_OK;
 }
 
+/* How many times as much another trial bends the shapes. Its cost counts as much as its bend: files say which of two
+ * sides that look alike is to be the front, but not that they look different. */
+static double lead_over(const trial *best, const trial *other) {
+  const int both = other->cost < INFINITY;
+  const double bend = both ? (best->bend[0] + best->bend[1]) / 2 : best->bend[0];
+  const double more = both ? (other->bend[0] + other->bend[1]) / 2 : other->bend[0];
+  const double cost = both ? best->cost : best->rough, dearer = both ? other->cost : other->rough;
+  const double most = ORB_FIND_LEAD_MOST;
+  return more * dearer < most * most * bend * cost ? sqrt(more / bend * (dearer / cost)) : most;
+}
+
 /* The listed trials, but not the targets. */
 static orb_status write_ranking(const search *t, orb_match *out) {
   const trial *best = &t->trial[t->list[0]];
   double cost = 1;
   out->cost = best->cost;
+  out->lead = t->listed > 1 ? INFINITY : ORB_FIND_LEAD_ALONE;
   out->bend = (best->bend[0] + best->bend[1]) / 2;
   out->other_count = 0;
   for (int32_t i = 1; i < t->listed; i++) {
@@ -325,6 +337,7 @@ static orb_status write_ranking(const search *t, orb_match *out) {
     orb_match_other *other = &out->other[out->other_count++];
     cost = fmax(cost, one->cost < INFINITY ? one->cost / best->cost : one->rough / best->rough);
     other->cost = cost;
+    out->lead = fmin(out->lead, lead_over(best, one));
     ORB_TRY(write_pairs(t, one, &other->pairs));
   }
   out->clear = t->listed > 1 ? 1 - 1 / out->other[0].cost : ORB_FIND_CLEAR_ALONE;
@@ -478,6 +491,7 @@ orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, doubl
   match->target = target;
   ORB_TRY(write_ranking(t, match));
   match->clear = clear;
+  match->lead = 1;
   return ORB_OK;
 }
 
@@ -489,11 +503,12 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
   memset(match, 0, sizeof *match);
 }
 
-double orb_match_confidence(double bend, double clear, double energy) {
+double orb_match_confidence(double bend, double clear, double lead, double energy) {
   if (!(energy >= 1) || !isfinite(energy)) { /* rounding of an isometry, or not measured: as if the map were bad */
     energy = energy < 1 ? 1 : ORB_FIND_SURE_UNMEASURED;
   }
   double odds = ORB_FIND_SURE + ORB_FIND_SURE_CLEAR * fmin(clear, ORB_FIND_CLEAR) - ORB_FIND_SURE_BEND * bend -
                 ORB_FIND_SURE_ENERGY * log(energy);
-  return 1 / (1 + exp(-odds));
+  const double share = 1 / (1 + exp(-(lead - 1) / ORB_FIND_TIE));
+  return share / (1 + exp(-odds));
 }

@@ -45,6 +45,8 @@ typedef struct orb_match {
   double bend;  /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
   double cost;  /* its bend, times 1 to 1 + ORB_FIND_TURN_COST for its rotation in space */
   double clear; /* 0 to 1: how far the next best map that differs is behind */
+  double lead;  /* how many times as much as the best map the one nearest to it bends the shapes, half of their
+                   rotations in space counted: about 1 where a shape looks alike from several sides */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
@@ -61,11 +63,12 @@ ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first
  * 0.4 s of one thread. */
 ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);
 /* Makes other[k] the best map, and the one that was best the first of the others. target: its own, which the match owns
- * from then on, also after a failure. clear: how far the other one is behind by what has decided. */
+ * from then on, also after a failure. clear: how far the other one is behind by what has decided.
+ * By their bends neither leads. */
 ORB_MUST_CHECK orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear);
-/* The confidence in a match, 0 to 1, from its bend, its `clear` and the energy of the map that followed it: calibrated
- * from 0.8 on (docs/bench-confidence.md). */
-double orb_match_confidence(double bend, double clear, double energy);
+/* The confidence in a match, 0 to 1, from its bend, its `clear`, its `lead` and the energy of the map that followed it:
+ * calibrated from 0.8 on (docs/bench-confidence.md). */
+double orb_match_confidence(double bend, double clear, double lead, double energy);
 void orb_match_free(orb_context *ctx, orb_match *match);
 
 #endif

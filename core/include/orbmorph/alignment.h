@@ -67,6 +67,9 @@ typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
   double bend;         /* of the best rough map: 0 for a rigid motion */
   double clear;        /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
+  double lead;         /* how many times as much as the best rough map the nearest other one bends the shapes, half of
+                          their rotations in space counted. About 1: the shapes do not tell which is right, as where
+                          one looks alike from several sides. At most 100 */
   double confidence;   /* 0 to 1, with the mean energy; calibrated on two shapes and from 0.8 on
                           (docs/bench-confidence.md) */
 } orb_match_facts;

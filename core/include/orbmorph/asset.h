@@ -9,7 +9,9 @@ extern "C" {
 #endif
 
 /* AUTO: SIMILARITY for the shapes whose frame clearly differs from the first one's: larger or smaller by more than 1.5,
- * rotated by more than 30°, or farther away than half the diagonal of the first shape; NONE for the others. */
+ * rotated by more than 30°, or farther away than half the diagonal of the first shape; NONE for the others.
+ * A rotation that differs from one by right angles by 30° or less, and fits hardly better, is replaced by that one:
+ * files have other axes, and shapes other postures. */
 typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY, ORB_FIT_AUTO } orb_fit;
 typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } orb_animation;
 typedef enum orb_holes { ORB_HOLES_REOPEN = 0, ORB_HOLES_FILLED } orb_holes;

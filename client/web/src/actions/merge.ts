@@ -147,20 +147,21 @@ export function matchesOf(best: Supermesh, at = 0): Matches | null {
     : null;
 }
 
-/** Shows the fast morph when it is done. Resolves once the daemon has its job, which then comes first in the queue. */
+/**
+ * Shows the fast morph when it is done. Resolves once the daemon has computed it: the job of the default one would run
+ * beside it, and take half of the processors from it.
+ */
 function showFast(running: Running, request: SupermeshRequest): Promise<void> {
   const abort = new AbortController();
   const { signal } = abort;
-  return new Promise((accepted) => {
+  return new Promise((computed) => {
     const show = async () => {
       try {
         const onProgress = (job: Job) => {
           running.fast!.job = job;
           set();
         };
-        const supermesh = await client
-          .merge(request, { signal, onJob: () => accepted(), onProgress })
-          .finally(() => accepted());
+        const supermesh = await client.merge(request, { signal, onProgress }).finally(() => computed());
         await openResult(supermesh, request, { signal });
         if (signal.aborted) return;
         set({ tab: 'morph', show: 'morph' });

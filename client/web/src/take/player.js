@@ -247,7 +247,7 @@ async function partOf(gl, file, primitive, center, radius) {
     color,
     texture,
     factor,
-    plain: !texture && !color && factor.slice(0, 3).every((x) => x > 0.99),
+    plain: !texture && !color && Math.max(...factor.slice(0, 3)) - Math.min(...factor.slice(0, 3)) < 0.01,
     cutoff: material.alphaMode === 'MASK' ? (material.alphaCutoff ?? 0.5) : 0,
     elements,
     count: index.length,
@@ -287,6 +287,7 @@ export async function open(canvas, glb, settings) {
   const { center, radius } = frameOf(file, primitives, shapes);
   const parts = [];
   for (const primitive of primitives) parts.push(await partOf(gl, file, primitive, center, radius));
+  const isTinted = parts.every((part) => part.plain); // grey all over: the file says nothing of colours
   const keys = pathOf(file, first, targets, shapes);
   const program = programOf(gl);
   const uniform = (name) => gl.getUniformLocation(program, name);
@@ -377,9 +378,7 @@ export async function open(canvas, glb, settings) {
         attribute(7, part.color?.buffer, part.color?.width);
         if (!part.color) gl.vertexAttrib4f(7, 1, 1, 1, 1);
         const [c, d] = [tints[from % tints.length], tints[to % tints.length]];
-        const base = part.plain
-          ? [...c.map((x, k) => x + (d[k] - x) * Math.min(1, Math.max(0, tint))), 1]
-          : part.factor;
+        const base = isTinted ? [...c.map((x, k) => x + (d[k] - x) * Math.min(1, Math.max(0, tint))), 1] : part.factor;
         gl.uniform4fv(uniform('base'), base);
         gl.uniform1i(uniform('mapped'), part.texture ? 1 : 0);
         gl.uniform1f(uniform('cutoff'), part.cutoff);
