@@ -1,8 +1,9 @@
 // Real meshes as templates: vertices, their order, corners and attributes stay, bit for bit. The readers here are not
-// orbmorph's. ORB_TEMPLATE_MOST: the largest mesh, in triangles; tests/long.sh takes all of them.
+// orbmorph's, and the Khronos validator has nothing to say. ORB_TEMPLATE_MOST: the largest mesh, in triangles; tests/long.sh takes all of them.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import test from 'node:test';
+import validator from 'gltf-validator';
 import { daemon } from './support/daemon.mjs';
 import { morphOf, parseGlb } from './support/glb.mjs';
 import * as real from './support/real.mjs';
@@ -106,7 +107,10 @@ for (const row of real.rows('good').filter((one) => Number(one.f) <= most))
       remesh: { method: 'template' },
       asset: { fit: 'none' },
     });
-    const { shapes: at, deltas, triangles, gltf, read, count } = morphOf((await d.get(made.asset)).bytes);
+    const asset = (await d.get(made.asset)).bytes;
+    const said = (await validator.validateBytes(new Uint8Array(asset), { maxIssues: 20 })).issues;
+    assert.equal(said.numErrors + said.numWarnings, 0, JSON.stringify(said.messages));
+    const { shapes: at, deltas, triangles, gltf, read, count } = morphOf(asset);
     assert.equal(gltf.meshes[0].primitives.length, 1);
     const { attributes } = gltf.meshes[0].primitives[0];
     const own = file.positions.length;
