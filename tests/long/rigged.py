@@ -23,9 +23,11 @@ def stage():
     """A camera like that of the other programs, a sun and a white world."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
-    scene.cycles.samples = 8
+    scene.cycles.samples = 32
     scene.cycles.use_denoising = False
     scene.render.resolution_x = scene.render.resolution_y = 300
+    scene.view_settings.view_transform = "Standard"
+    scene.render.film_transparent = True
     scene.world = bpy.data.worlds.new("white")
     scene.world.color = (1, 1, 1)
     camera = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))

@@ -282,15 +282,17 @@ static orb_mesh torus(int n, double thin) {
 
 static void test_refused(void **state) {
   (void)state;
-  const orb_repair_options safe = {.repair = ORB_REPAIR_SAFE}, close = {.repair = ORB_REPAIR_CLOSE_HANDLES};
+  const orb_repair_options safe = {.repair = ORB_REPAIR_SAFE},
+                           close = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = 0.01};
   for (int i = 0; i < 2; i++) {
     orb_mesh ring = torus(24, 1);
     check_refused(&ring, i ? &close : &safe, 1);
     size_t size;
-    for (int holes = 1; holes <= 5; holes += 2) {
-      char *text = handles_plate(holes, &size);
+    static const int holes[] = {1, 3, 5, 60};
+    for (int k = 0; k < 4; k++) {
+      char *text = handles_plate(holes[k], &size);
       orb_mesh plate = read_text(text, size);
-      check_refused(&plate, i ? &close : &safe, holes);
+      check_refused(&plate, i ? &close : &safe, holes[k]);
     }
   }
   assert_non_null(strstr(orb_context_error(ctx)->detail, "handle_size"));
