@@ -202,6 +202,15 @@ static void test_animals(void **state) {
     orb_mesh mesh;
     assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, &mesh, NULL), ORB_OK);
     close_all(&mesh, 4 + i, 3, 0.2, 0);
+    for (int count = 1; getenv("ORB_HANDLES_ALL") && count <= 50; count++) {
+      int made;
+      free(handles_stitch(&mesh, count, 3, &size, &made));
+      if (made < count) {
+        print_message("%s has room for %d handles\n", names[i], made);
+        break;
+      }
+      close_all(&mesh, count, 3, 0.2, 0);
+    }
     orb_mesh_free(ctx, &mesh);
   }
 }
@@ -242,6 +251,12 @@ static void test_scans(void **state) {
   for (int count = 1; all && count <= 50; count++) {
     orb_mesh ball = shape_ball(ctx, 6);
     close_all(&ball, count, (unsigned)count, 0, 1);
+    shape_free(ctx, &ball);
+  }
+  if (all) {
+    orb_mesh ball = shape_ball(ctx, 8);
+    double seconds = close_all(&ball, 20, 1, 0, 1);
+    print_message("a ball, %d triangles, 20 handles: %.2f s\n", ball.triangle_count, seconds);
     shape_free(ctx, &ball);
   }
 }
