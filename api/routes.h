@@ -9,8 +9,9 @@
 /* The parameters of every list. */
 #define API_LISTED "limit page_token id_prefix"
 /* The parameters of a recipe, see server/http/morph.c. */
-#define API_RECIPE \
-  "shapes names landmarks align preset remesh tolerance max_triangles fit path animation normals holes wait profile "
+#define API_RECIPE                                                                                                     \
+  "shapes names landmarks align preset remesh tolerance max_triangles fit path animation normals holes transfer wait " \
+  "profile "
 
 /* The route table: one row for each method of each path, with what its body holds, the scope that a token needs, the
  * query parameters that it takes, and the function of server/http that handles it. Adding a row is all that routing

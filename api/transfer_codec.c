@@ -1,6 +1,7 @@
 #include "api/transfer_codec.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "api/json.h"
@@ -89,6 +90,53 @@ int api_transfer_read(const cJSON *list, int32_t shape_count, orb_carry *out, in
     skin = made->what == ORB_CARRY_SKIN ? (int)*count : skin;
   }
   return 1;
+}
+
+/* A part of an entry: digits become a number. */
+static int add_part(cJSON *item, const char *name, const char *text, size_t size, int is_number) {
+  char part[16];
+  size_t kept = size < sizeof part ? size : sizeof part - 1;
+  memcpy(part, text, kept);
+  part[kept] = 0;
+  return is_number && size > 0 && kept == size && strspn(part, "0123456789") == size
+             ? cJSON_AddNumberToObject(item, name, strtod(part, NULL)) != NULL
+             : cJSON_AddStringToObject(item, name, part) != NULL;
+}
+
+/* One entry: the shape, what, and of a texture the texels a side. */
+static int add_entry(cJSON *list, const char *text, size_t size) {
+  cJSON *item = cJSON_CreateObject();
+  if (!item || !cJSON_AddItemToArray(list, item)) {
+    cJSON_Delete(item);
+    return 0;
+  }
+  const char *first = memchr(text, ':', size);
+  size_t before = first ? (size_t)(first - text) : size;
+  if (!add_part(item, "from", text, before, 1)) {
+    return 0;
+  }
+  if (!first) {
+    return 1;
+  }
+  const char *what = first + 1, *second = memchr(what, ':', size - before - 1);
+  size_t length = second ? (size_t)(second - what) : size - before - 1;
+  return add_part(item, "what", what, length, 0) &&
+         (!second || add_part(item, "resolution", second + 1, size - before - length - 2, 1));
+}
+
+cJSON *api_transfer_parse(const char *list) {
+  cJSON *out = cJSON_CreateArray();
+  int fine = out != NULL;
+  for (int count = 0; fine && list && count <= ORB_CARRY_MAX; count++) { /* one more than is accepted */
+    const char *end = strchr(list, ',');
+    fine = add_entry(out, list, end ? (size_t)(end - list) : strlen(list));
+    list = end ? end + 1 : NULL;
+  }
+  if (!fine) {
+    cJSON_Delete(out);
+    out = NULL;
+  }
+  return out;
 }
 
 void api_transfer_write(const orb_carry *carries, int32_t count, api_text *out) {

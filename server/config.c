@@ -46,7 +46,10 @@ static const entry table[] = {
      "15 minutes"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
     {"role", TEXT(role), "all",
-     "of a node that shares its catalogue with others; serve: runs no jobs; work: runs jobs and has no port"},
+     "what a node does that shares its catalogue with others: serve (runs no jobs), work (serves no requests), or all"},
+    {"metrics-listen", TEXT(metrics_listen), "",
+     "of the role work: where it answers /metrics, /livez and /readyz, and nothing else; as listen; without it: "
+     "nowhere"},
     {"lease-seconds", NUMBER(lease_seconds, 2, 3600), "30",
      "other nodes take over the jobs of a node that is silent for this long"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
@@ -110,6 +113,9 @@ static const entry table[] = {
     {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
     {"log-level", TEXT(log_level), "info", "debug, info, warn or error"},
     {"log-format", TEXT(log_format), "json", "json or text"},
+    {"traces", TEXT(traces), "",
+     "URL of a collector of OpenTelemetry, such as http://localhost:4318: it gets spans of requests and jobs as JSON "
+     "over HTTP; without it: none"},
     {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key, the daemon speaks https"},
     {"tls-key", TEXT(tls_key), "", "PEM file"},
     {"tls-authorities", TEXT(tls_authorities), "",
@@ -357,14 +363,14 @@ static int is_one_of(const char *name, const char *value, const char *const word
   return 0;
 }
 
-static int is_address(const char *text) {
+static int is_address(const char *name, const char *text) {
   const char *colon = strrchr(text, ':');
   size_t digits = colon ? strspn(colon + 1, "0123456789") : 0;
   int fine = strncmp(text, "unix:", 5) == 0
                  ? text[5] != 0
                  : digits > 0 && digits <= 5 && colon[1 + digits] == 0 && strtol(colon + 1, NULL, 10) <= 65535;
   if (!fine) {
-    complain("listen must be ADDR:PORT, [V6]:PORT (a port from 0 to 65535) or unix:PATH, not \"%s\"", text);
+    complain("%s must be ADDR:PORT, [V6]:PORT (a port from 0 to 65535) or unix:PATH, not \"%s\"", name, text);
   }
   return fine;
 }
@@ -435,6 +441,14 @@ static int is_role(const config *options) {
   return fine;
 }
 
+static int is_metrics_address(const config *options) {
+  if (options->metrics_listen[0] && strcmp(options->role, "work") != 0) {
+    complain("metrics-listen is for the role work; the role %s answers /metrics where it listens", options->role);
+    return 0;
+  }
+  return !options->metrics_listen[0] || is_address("metrics-listen", options->metrics_listen);
+}
+
 const char *config_catalogue(const config *options) {
   return strcmp(options->catalogue, "sqlite") == 0 ? NULL : options->catalogue;
 }
@@ -443,6 +457,15 @@ static int is_readable(const char *name, const char *path) {
   int fine = !*path || access(path, R_OK) == 0;
   if (!fine) {
     complain("%s: %s cannot be read: %s", name, path, strerror(errno));
+  }
+  return fine;
+}
+
+static int is_collector(const char *url) {
+  const char *host = strncmp(url, "http://", 7) == 0 ? url + 7 : strncmp(url, "https://", 8) == 0 ? url + 8 : NULL;
+  int fine = !*url || (host && *host && *host != '/' && !strpbrk(host, " ?#@"));
+  if (!fine) {
+    complain("traces must be a URL such as http://localhost:4318, without a user or a query");
   }
   return fine;
 }
@@ -485,14 +508,15 @@ static int consistent(config *out) {
     complain("tls-certificate and tls-key must both be set, or neither");
     return 0;
   }
-  return is_address(out->listen) && is_catalogue(out->catalogue) && is_objects(out->objects) && is_role(out) &&
-         is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
+  return is_address("listen", out->listen) && is_catalogue(out->catalogue) && is_objects(out->objects) &&
+         is_role(out) && is_metrics_address(out) && is_mode(out->socket_mode) &&
+         is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
          is_one_of("assets", out->assets, assets) && is_readable("s3-keys", out->s3_keys) &&
          is_one_of("isolate", out->isolate, isolate) && is_one_of("log-level", out->log_level, levels) &&
          is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) && are_hosts(out->hosts) &&
-         is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key) &&
-         is_readable("tls-authorities", out->tls_authorities) && are_networks("webhook-allow", out->webhook_allow) &&
-         are_networks("fetch-allow", out->fetch_allow);
+         is_collector(out->traces) && is_readable("tls-certificate", out->tls_certificate) &&
+         is_readable("tls-key", out->tls_key) && is_readable("tls-authorities", out->tls_authorities) &&
+         are_networks("webhook-allow", out->webhook_allow) && are_networks("fetch-allow", out->fetch_allow);
 }
 
 config_action config_read(config *out, int argc, char **argv) {

@@ -17,13 +17,15 @@ typedef struct config {
   char hosts[512]; /* names in Host, comma-separated, or * */
   char cors[512];  /* origins, comma-separated, or * */
   char log_level[16], log_format[16];
+  char traces[1024];                           /* URL of a collector of OpenTelemetry; "": off */
   char webhook_allow[1024], fetch_allow[1024]; /* networks, comma-separated */
   char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2], tls_authorities[PATH_MAX / 2];
-  char auth[16];       /* loopback, on, off */
-  char limits[16];     /* remote, all, off */
-  char socket_mode[8]; /* octal */
-  char isolate[16];    /* on, off, strict */
-  char role[16];       /* all, serve, work */
+  char auth[16];            /* loopback, on, off */
+  char limits[16];          /* remote, all, off */
+  char socket_mode[8];      /* octal */
+  char isolate[16];         /* on, off, strict */
+  char role[16];            /* all, serve, work */
+  char metrics_listen[256]; /* as listen; of the role work; "": no port */
   int64_t workers, worker_nice, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;

@@ -209,6 +209,22 @@ static void drop_unused(catalogue *cat, objects *store, const char *id) {
   resource_free(&row);
 }
 
+enum { LOST_TRIES = 3 };
+
+/* Commits the row of a published mesh, whose file may be gone if the hold was lost. */
+static store_result put_row(catalogue *cat, objects *store, const resource *row, const char *tenant, int64_t quota,
+                            int *fresh) {
+  store_result stored = catalogue_put_for(cat, row, tenant, quota, fresh);
+  for (int i = 0; stored == STORE_LOST && i < LOST_TRIES; i++) {
+    objects_hold_again(store);
+    if (objects_look(store, OBJECT_MESH, row->id) != STORE_OK) {
+      return STORE_LOST;
+    }
+    stored = catalogue_put_for(cat, row, tenant, quota, fresh);
+  }
+  return stored;
+}
+
 store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx,
                           const intake_limits *limits, const char *tenant, int64_t quota, int *fresh,
                           api_problem *problem) {
@@ -230,7 +246,7 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
   store_result stored = objects_publish(store, file->temp, OBJECT_MESH, file->id);
   FAULT_POINT("mesh-published");
   if (stored == STORE_OK) {
-    stored = catalogue_put_for(cat, &row, tenant, quota, fresh);
+    stored = put_row(cat, store, &row, tenant, quota, fresh);
   }
   objects_let_go(store);
   resource_free(&row);

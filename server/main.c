@@ -25,6 +25,7 @@
 #include "scrub.h"
 #include "store/place.h"
 #include "systemd.h"
+#include "trace/send.h"
 #include "worker/confined.h"
 #include "worker/pool.h"
 
@@ -85,8 +86,14 @@ static int has_role(const config *options, const char *role) {
 
 static void announce(const server *srv) {
   const char *text = srv->at.text;
-  if (has_role(srv->options, "work")) {
+  if (srv->at.fd < 0) {
     puts("orbmorphd works without a port");
+  } else if (srv->works_only) {
+    printf("orbmorphd works; metrics on %s%s\n",
+           strncmp(text, "unix:", 5) == 0 ? ""
+           : srv->options->tls_key[0]     ? "https://"
+                                          : "http://",
+           text);
   } else if (strncmp(text, "unix:", 5) == 0) {
     printf("orbmorphd listening on %s\n", text);
   } else {
@@ -382,6 +389,11 @@ static int start_scrub(server *srv) {
   return srv->scrub || o->scrub_rate == 0;
 }
 
+static int start_traces(const config *o) {
+  return !o->traces[0] ||
+         trace_start(&(trace_options){.url = o->traces, .authorities = o->tls_authorities, .role = o->role});
+}
+
 static int open_stores(server *srv) {
   const store_place place = store_place_of(srv->options);
   store_result result = stores_open(&place, &srv->store, &srv->cat);
@@ -426,7 +438,9 @@ static int start(server *srv, worker_pool **workers) {
   if (queued.cores < queued.workers) {
     queued.cores = queued.workers;
   }
-  int serves = !has_role(o, "work"), listens = !serves || listen_open(o, &srv->at);
+  srv->works_only = has_role(o, "work");
+  const char *where = srv->works_only ? o->metrics_listen : o->listen;
+  int listens = !where[0] || listen_open(o, where, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
   return listens && srv->memory && open_stores(srv) && check_catalogue(srv) &&
          (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
@@ -434,10 +448,10 @@ static int start(server *srv, worker_pool **workers) {
          queue_recover(srv->q, isolate_is_on()) == STORE_OK && heals(srv) &&
          (srv->io = tasks_start((int)o->io_threads, NULL)) && readers_start(srv->memory) &&
          (srv->checks = tasks_start((int)o->workers, srv->memory)) &&
-         (srv->large_checks = tasks_start((int)o->workers, srv->memory)) && net_start() &&
+         (srv->large_checks = tasks_start((int)o->workers, srv->memory)) && net_start() && start_traces(o) &&
          start_outbox(srv, &delivered) &&
          (!sharing.works || (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store))) &&
-         (!serves || http_start(srv)) && start_scrub(srv);
+         (srv->at.fd < 0 || http_start(srv)) && start_scrub(srv);
 }
 
 /* Stops all parts that were started. */
@@ -472,6 +486,7 @@ static void stop(server *srv, worker_pool *workers) {
   cache_destroy(srv->descriptions);
   callers_close(srv->callers);
   signers_close(srv->signers);
+  trace_stop(); /* all threads that make spans have ended */
 }
 
 static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
@@ -481,7 +496,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
     log_error("the daemon could not be started");
   } else {
     __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
-    if (srv->needs_token && callers_count(srv->callers) == 0) {
+    if (srv->at.fd >= 0 && srv->needs_token && callers_count(srv->callers) == 0) {
       log_warn("tokens are needed but none exist: create one with orbmorphd token add");
     }
     srv->control = control_listen(srv->options->data);
@@ -496,7 +511,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
 
 static int run(const command_line *line) {
   const config *options = line->options;
-  server srv = {.options = options};
+  server srv = {.options = options, .at = {.fd = -1}};
   sigset_t set;
   struct timespec now;
   int signals = take_signals(&set);

@@ -102,7 +102,7 @@ static int are_two_folders(const char *from, const char *to) {
     return complain(to, errno == EEXIST ? "is not a folder" : strerror(errno));
   }
   if (stat(from, &a) != 0 || stat(to, &b) != 0 || (a.st_dev == b.st_dev && a.st_ino == b.st_ino)) {
-    return complain(to, "is the data folder of the source, too: name a new one with --data");
+    return complain(to, "is also the data folder of the source: name a new one with --data");
   }
   return 1;
 }

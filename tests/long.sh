@@ -2,8 +2,8 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash migrate cluster attacks deaths faults faults_asan soak load adversarial arm robust templates
-#   holes handles rigged deploy blender visit
+#   tsan valgrind fuzz crash migrate cluster pgbouncer claims attacks deaths faults faults_asan soak load adversarial arm
+#   robust templates holes handles rigged deploy blender visit
 #
 # ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_ROUNDS (500) that of
 # rounds of chaos among several nodes, ORB_TEST_PATIENCE how many times longer than usual scenarios wait for what should
@@ -100,6 +100,21 @@ part_cluster() {
   cmake --build build --target orbmorphd
   ORB_ROUNDS=${ORB_ROUNDS:-500} ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh tests/tools/with_s3.sh \
     node --test --test-reporter=spec tests/scenario/nodes.test.mjs
+}
+
+# The same nodes, with pgbouncer before PostgreSQL.
+part_pgbouncer() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target orbmorphd
+  ORB_ROUNDS=${ORB_ROUNDS:-25} ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh \
+    tests/tools/with_pgbouncer.sh tests/tools/with_s3.sh node --test --test-reporter=spec tests/scenario/nodes.test.mjs
+}
+
+# Claims of jobs in a queue of ORB_JOBS (1000000).
+part_claims() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target claims-bench
+  tests/tools/with_postgresql.sh build/bin/claims-bench "${ORB_JOBS:-1000000}"
 }
 
 # All attacks of tests/scenario/attacks.test.mjs, with larger files and from several connections at once.
@@ -248,8 +263,8 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash migrate cluster attacks deaths faults faults_asan soak load adversarial arm robust templates holes \
-    handles rigged deploy blender visit
+  set -- tsan valgrind fuzz crash migrate cluster pgbouncer claims attacks deaths faults faults_asan soak load \
+    adversarial arm robust templates holes handles rigged deploy blender visit
 fi
 for part in "$@"; do
   echo "== $part =="

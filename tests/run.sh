@@ -7,7 +7,7 @@
 #   build      builds the studio and the release build, with warnings as errors
 #   asan       unit and scenario tests, in a build with AddressSanitizer and UndefinedBehaviorSanitizer
 #   release    every test, in the release build; in a full run without the scenarios that asan has run
-#   fuzz       each fuzz target for ORB_FUZZ_SECONDS (7) of CPU time
+#   fuzz       each fuzz target for ORB_FUZZ_SECONDS (3) of CPU time
 #   core       only the library and its unit tests, where the daemon does not build; not part of a full run
 #
 # In a full run the tests in a browser, which run one at a time and mostly wait, run beside asan and release, and so do the
@@ -78,7 +78,7 @@ step_asan() {
 # From one seed, so that two runs try much the same inputs; long runs look for new ones.
 run_fuzz() {
   rm -f build-fuzz/results
-  ORB_FUZZ_SEED=1 ORB_PLAIN="$PWD/build" "$@" tests/fuzz/run.sh --cpu "${ORB_FUZZ_SECONDS:-7}"
+  ORB_FUZZ_SEED=1 ORB_PLAIN="$PWD/build" "$@" tests/fuzz/run.sh --cpu "${ORB_FUZZ_SECONDS:-3}"
 }
 
 step_fuzz() {

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "align/find/match.h"
+#include "align/find/params.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "base/check.h"
@@ -43,6 +44,7 @@ static void matches_free(orb_context *ctx, matches *m) {
 
 /* Gathers the vertices of the first shape that every match pairs, and their partners. */
 static void gather(matches *m) {
+  m->count = 0;
   for (int32_t i = 0; m->shape_count > 1 && i < m->of[1].pairs.count; i++) {
     int32_t found = 1;
     m->vertex[m->count] = m->of[1].pairs.first[i];
@@ -159,14 +161,60 @@ static orb_status align_walks(orb_context *ctx, const orb_align_shape *shapes, c
   return status;
 }
 
-/* Composes a rotated alignment towards the matches; where that has led to no good map, pinned at their pairs; and where
- * that has led to none either, by walks. */
-static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                                 const orb_align_options *options, orb_alignment *alignment) {
-  const double poor = orb_map_params_of(options->preset).energy.poor;
+/* The next best match of two shapes, with its map. */
+typedef struct next_match {
+  int is_open;
+  double *target;
+  orb_alignment alignment;
+} next_match;
+
+static void next_free(orb_context *ctx, next_match *next) {
+  orb_free(ctx, next->target);
+  orb_alignment_free(ctx, &next->alignment);
+  memset(next, 0, sizeof *next);
+}
+
+/* Composes two shapes towards the next best match, unless the best one has led to a good map, or the next one is far
+ * behind. */
+static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
+                            const orb_align_options *options, double energy, next_match *next) {
+  orb_align_options rotated = *options;
+  rotated.preset = ORB_PRESET_FAST;
+  if (m->shape_count != 2 || m->of[1].other_count == 0 || !(energy > ORB_FIND_OTHER_ABOVE) ||
+      m->of[1].other[0].cost > ORB_FIND_OTHER_BEHIND) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_match_other_target(ctx, &m->of[1], 0, &next->target));
+  ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, &next->alignment));
+  next->is_open = 1;
+  const double *const targets[2] = {NULL, next->target};
+  return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, targets, options->preset);
+}
+
+/* Makes the next best match the match, if its map has clearly less energy than the best one's: a twisted body bends
+ * less when its limbs are swapped, and the map tells. That the two disagree leaves the match unclear. */
+static orb_status next_take(orb_context *ctx, matches *m, double poor, next_match *next, orb_alignment *alignment) {
+  if (!next->is_open || !(next->alignment.energy < ORB_FIND_OTHER_GAIN * alignment->energy)) {
+    return ORB_OK;
+  }
+  const double clear = fmax(0, 1 - next->alignment.energy / fmin(alignment->energy, poor));
+  double *target = next->target;
+  orb_alignment_free(ctx, alignment);
+  *alignment = next->alignment;
+  memset(next, 0, sizeof *next);
+  ORB_TRY(orb_match_choose(ctx, &m->of[1], 0, target, clear));
+  m->targets[1] = m->of[1].target;
+  m->clear = m->of[1].clear;
+  m->bend = m->of[1].bend;
+  gather(m);
+  return ORB_OK;
+}
+
+/* What leads on where a match has led to no good map: its pairs are pinned, and then its targets guide walks. */
+static orb_status improve_poor(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
+                               const orb_align_options *options, double poor, orb_alignment *alignment) {
   orb_alignment other;
   int held;
-  ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? m->targets : NULL, options->preset));
   if (m->count < LEAST_PAIRS || alignment->energy <= poor) {
     return ORB_OK;
   }
@@ -180,6 +228,25 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   ORB_TRY(align_walks(ctx, shapes, m, options, &other));
   keep_better(ctx, alignment, &other);
   return ORB_OK;
+}
+
+/* Composes a rotated alignment towards the matches; where that has led to no good map, towards the next best match as
+ * well; and where neither has led to one, by other ways to the best one. */
+static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, matches *m,
+                                 const orb_align_options *options, orb_alignment *alignment) {
+  const double poor = orb_map_params_of(options->preset).energy.poor;
+  next_match next = {0};
+  orb_status status;
+  ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? m->targets : NULL, options->preset));
+  ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, &next), end);
+  if (next.is_open && next.alignment.energy <= poor) {
+    ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
+  }
+  ORB_GO(status, improve_poor(ctx, shapes, m, options, poor, alignment), end);
+  status = next_take(ctx, m, poor, &next, alignment);
+end:
+  next_free(ctx, &next);
+  return status;
 }
 
 /* The vertex of a shape that its match takes nearest to a point of the first shape. */

@@ -11,6 +11,8 @@
 #include "carry/corners.h"
 #include "format/gltf_add.h"
 #include "mesh/dropped.h"
+#include "numeric/vec3.h"
+#include "orbmorph/utf8.h"
 
 /* What the additions are made of; memory of the context. */
 typedef struct adder {
@@ -19,7 +21,8 @@ typedef struct adder {
   float **values;
   uint16_t *joints; /* 4 a vertex, as the weights */
   float *weights;
-  orb_baked *baked; /* as many as textures, as the variants and images */
+  double *before, *after, *area; /* of the surface of a skin */
+  orb_baked *baked;              /* as many as textures, as the variants and images */
   orb_added_variant *variants;
   orb_added_image **images;
   int32_t *texture_carry;
@@ -46,6 +49,9 @@ static void adder_free(orb_context *ctx, const orb_carrier *carrier, adder *a) {
   orb_free(ctx, a->corner);
   orb_free(ctx, a->joints);
   orb_free(ctx, a->weights);
+  orb_free(ctx, a->before);
+  orb_free(ctx, a->after);
+  orb_free(ctx, a->area);
 }
 
 /* The value of each vertex of the asset; those off the surface get white, or zeros. */
@@ -68,6 +74,55 @@ static orb_status fill_sets(orb_context *ctx, const orb_carrier *carrier, int32_
     }
     a->sets[i] = (orb_added_set){.width = wedges->width, .values = values};
   }
+  return ORB_OK;
+}
+
+/* The surface of the asset on a shape, in the coordinates of the asset. */
+static orb_status surface_on(orb_context *ctx, const orb_carrier *carrier, int32_t shape, double **out) {
+  const orb_supermesh *mesh = carrier->job.supermesh;
+  const double *m = carrier->moved + 16 * (int64_t)shape;
+  double *points = *out = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
+  if (!points) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(orb_transfer_positions(ctx, &carrier->job.shapes[shape], mesh->places + (int64_t)shape * mesh->vertex_count,
+                                 mesh->vertex_count, points));
+  for (int64_t v = 0; v < mesh->vertex_count; v++) {
+    double *p = points + 3 * v, moved[3];
+    for (int k = 0; k < 3; k++) {
+      moved[k] = m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2] + m[12 + k];
+    }
+    memcpy(p, moved, sizeof moved);
+  }
+  return ORB_OK;
+}
+
+/* What the joints of a skin are fitted by. */
+static orb_status fill_surface(orb_context *ctx, const orb_carrier *carrier, int32_t from, adder *a,
+                               orb_skin_surface *out) {
+  const orb_supermesh *mesh = carrier->job.supermesh;
+  a->area = ORB_NEW0(ctx, double, mesh->vertex_count);
+  if (!a->area) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(surface_on(ctx, carrier, from, &a->before));
+  ORB_TRY(surface_on(ctx, carrier, 0, &a->after));
+  for (int64_t t = 0; t < mesh->triangle_count; t++) {
+    const int32_t *corner = mesh->triangles + 3 * t;
+    double u[3], w[3], n[3];
+    orb_sub(a->after + 3 * (int64_t)corner[1], a->after + 3 * (int64_t)corner[0], u);
+    orb_sub(a->after + 3 * (int64_t)corner[2], a->after + 3 * (int64_t)corner[0], w);
+    orb_cross(u, w, n);
+    for (int k = 0; k < 3; k++) {
+      a->area[corner[k]] += orb_length(n) / 6;
+    }
+  }
+  *out = (orb_skin_surface){.count = mesh->vertex_count,
+                            .before = a->before,
+                            .after = a->after,
+                            .area = a->area,
+                            .joints = (const uint16_t(*)[4])carrier->skin.joints,
+                            .weights = (const float(*)[4])carrier->skin.weights};
   return ORB_OK;
 }
 
@@ -97,7 +152,7 @@ static orb_status fill_skin(orb_context *ctx, const orb_carrier *carrier, const 
                           .weights = a->weights};
   memcpy(out->place, skin->given.place, sizeof out->place);
   memcpy(out->moved, carrier->moved + 16 * (int64_t)carry->from, sizeof out->moved);
-  return ORB_OK;
+  return carry->from > 0 ? fill_surface(ctx, carrier, carry->from, a, &out->surface) : ORB_OK; /* its own fits */
 }
 
 static orb_carried *list_one(const orb_carrier *carrier, int32_t number, orb_carried *list, int32_t *count) {
@@ -125,7 +180,7 @@ static orb_status list_carried(orb_context *ctx, const orb_carrier *carrier, con
     (void)snprintf(one->as, sizeof one->as, "%s", more->variants[i].name);
   }
   if (carrier->skin_carry >= 0) {
-    (void)snprintf(list_one(carrier, carrier->skin_carry, *list, count)->as, ORB_NAME_MAX, "JOINTS_0");
+    (void)snprintf(list_one(carrier, carrier->skin_carry, *list, count)->as, sizeof(*list)->as, "JOINTS_0");
   }
   return ORB_OK;
 }
@@ -134,13 +189,13 @@ static orb_status list_carried(orb_context *ctx, const orb_carrier *carrier, con
 static orb_status list_targets(orb_context *ctx, const orb_carrier *carrier, const int32_t *vertices,
                                int32_t vertex_count, const orb_buffer *asset, orb_carried *list, int32_t *count) {
   int32_t targets = carrier->target_count;
-  char(*found)[ORB_NAME_MAX] = orb_calloc(ctx, (size_t)targets + 1, sizeof *found);
+  orb_given_name *found = ORB_NEW0(ctx, orb_given_name, (int64_t)targets + 1);
   orb_status status =
       found ? orb_given_last_targets(ctx, asset->data, asset->size, vertices, vertex_count, targets, found)
             : ORB_E_NO_MEMORY;
   for (int32_t k = 0; status == ORB_OK && k < targets; k++) {
     orb_carried *one = list_one(carrier, carrier->target_carry[k], list, count);
-    (void)snprintf(one->as, sizeof one->as, "%s", *found[k] ? found[k] : carrier->targets[k].name);
+    (void)orb_utf8_copy(one->as, sizeof one->as, *found[k] ? found[k] : carrier->targets[k].name);
   }
   orb_free(ctx, found);
   return status;
@@ -159,7 +214,7 @@ static void describe_variant(const orb_mesh *mesh, const orb_baked *baked, const
     const orb_material_value *value = &mesh->material_values[material->first_value + v];
     out->is_double_sided |= value->member == ORB_MATERIAL_DOUBLE_SIDED && value->number[0] > 0;
   }
-  (void)snprintf(out->name, sizeof out->name, "%s", name);
+  (void)orb_utf8_copy(out->name, ORB_NAME_MAX, name); /* the rest is for a number that makes it unique */
 }
 
 static orb_status bake_one(orb_context *ctx, const orb_carrier *carrier, int32_t number, const orb_given_charts *charts,
@@ -268,6 +323,9 @@ orb_status orb_carried_settle(orb_context *ctx, const orb_carried *carried, int3
     int is_settled = 0;
     for (int32_t k = 0; k < count && !is_settled; k++) {
       is_settled = is_about(&(*dropped)[i], &carried[k]);
+      if (carried[k].what == ORB_CARRY_SKIN && carried[k].from == 0 && strcmp((*dropped)[i].what, "animations") == 0) {
+        (*dropped)[i].why = "Of the animations, the asset has those of its skeleton.";
+      }
     }
     if (!is_settled) {
       (*dropped)[left++] = (*dropped)[i];

@@ -26,6 +26,21 @@ static orb_status refuse(orb_context *ctx, const orb_carry *carry, const char *w
   return status;
 }
 
+static orb_status check_texture(orb_context *ctx, const orb_carry *carry, int32_t number) {
+  if (carry->from == 0) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "Entry %d of \"transfer\" takes a texture from the first shape, whose materials the asset has "
+                    "already. Name a later shape.",
+                    (int)number);
+  }
+  if (carry->resolution != 0 && (carry->resolution < ORB_BAKE_LEAST || carry->resolution > ORB_BAKE_MOST)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "The resolution of entry %d of \"transfer\" is %d texels a side; %d to %d are possible.",
+                    (int)number, (int)carry->resolution, (int)ORB_BAKE_LEAST, (int)ORB_BAKE_MOST);
+  }
+  return ORB_OK;
+}
+
 static orb_status check(orb_context *ctx, const orb_carry_job *job) {
   int32_t skins = 0;
   for (int32_t i = 0; i < job->carry_count; i++) {
@@ -33,6 +48,9 @@ static orb_status check(orb_context *ctx, const orb_carry_job *job) {
     if ((unsigned)carry->what >= ORB_CARRY_COUNT || carry->from < 0 || carry->from >= job->supermesh->shape_count ||
         job->carry_count > ORB_CARRY_MAX) {
       return orb_fail(ctx, ORB_E_BAD_OPTION, "Entry %d of \"transfer\" is out of range.", (int)i);
+    }
+    if (carry->what == ORB_CARRY_TEXTURE) {
+      ORB_TRY(check_texture(ctx, carry, i));
     }
     skins += carry->what == ORB_CARRY_SKIN;
   }

@@ -1,5 +1,5 @@
-/* Carrying what shapes have besides a surface onto the asset: first orb_carrier_open(), with whose splits and
- * targets the asset is written, then orb_carrier_add(). */
+/* Carrying what shapes have besides a surface onto the asset. orb_carrier_open() comes first; then the asset is written
+ * with the carrier's splits and targets; then orb_carrier_add() adds the rest to it. */
 #ifndef ORB_CARRY_CARRY_H
 #define ORB_CARRY_CARRY_H
 
@@ -44,15 +44,15 @@ typedef struct orb_carrier {
 ORB_MUST_CHECK orb_status orb_carrier_open(orb_context *ctx, const orb_carry_job *job, orb_carrier *out);
 void orb_carrier_free(orb_context *ctx, orb_carrier *carrier);
 
-/* Replaces the GLB by one that has it all. vertices: the supermesh vertices of its vertex_count vertices, −1: none.
- * *list (freed by the caller, after an error too) and *count: what was carried. */
+/* Replaces the GLB by one that has all that is carried. vertices: the supermesh vertices of its vertex_count vertices,
+ * −1: none. *list (freed by the caller, after an error too) and *count: what was carried. */
 ORB_MUST_CHECK orb_status orb_carrier_add(orb_context *ctx, const orb_carrier *carrier, const int32_t *vertices,
                                           int32_t vertex_count, orb_buffer *asset, orb_carried **list, int32_t *count);
 
 /* Whether orb_carrier_add() changes more of the asset than its splits and targets, so that it has no profiles. */
 int orb_carrier_edits(const orb_carrier *carrier);
 
-/* Takes what was carried out of a list of what the asset lacks, and adds what of it is not as it was. */
+/* Removes what was carried from a list of what the asset lacks, and adds what of it was changed on the way. */
 ORB_MUST_CHECK orb_status orb_carried_settle(orb_context *ctx, const orb_carried *carried, int32_t count,
                                              orb_dropped **dropped, int32_t *dropped_count);
 

@@ -7,7 +7,7 @@
 #include "format/gltf_blocks.hh"
 #include "format/gltf_edit.hh"
 #include "format/gltf_parse.hh"
-#include "format/gltf_skeleton.hh"
+#include "format/gltf_rig.hh"
 
 extern "C" {
 #include "format/gltf_document.h"

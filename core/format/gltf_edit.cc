@@ -85,12 +85,16 @@ void set(cJSON *object, const char *key, double value) {
   set(object, key, cJSON_CreateNumber(value));
 }
 
-int64_t append(cJSON *array, cJSON *value) {
-  int64_t index = cJSON_GetArraySize(array);
+void push(cJSON *array, cJSON *value) {
   if (!cJSON_AddItemToArray(array, made(value))) {
     cJSON_Delete(value);
     throw std::bad_alloc();
   }
+}
+
+int64_t append(cJSON *array, cJSON *value) {
+  int64_t index = cJSON_GetArraySize(array);
+  push(array, value);
   return index;
 }
 
@@ -120,7 +124,7 @@ int64_t Editor::add_view(const void *bytes, size_t size, int target) {
   size_t start = first_.size + padding(first_.size) + added_.size;
   must(orb_buffer_append(ctx_, &added_, bytes, size));
   cJSON *view = made(cJSON_CreateObject());
-  append(views_, view);
+  push(views_, view);
   set(view, "buffer", 0.0);
   set(view, "byteOffset", static_cast<double>(start));
   set(view, "byteLength", static_cast<double>(size));
@@ -133,8 +137,8 @@ int64_t Editor::add_view(const void *bytes, size_t size, int target) {
 int64_t Editor::add_list(const void *bytes, size_t size, int component_type, size_t count, const char *type,
                          bool attribute) {
   int64_t view = add_view(bytes, size, attribute ? ORB_GLTF_ARRAY_BUFFER : 0);
-  cJSON *accessor = made(cJSON_CreateObject());
-  append(accessors_, accessor);
+  cJSON *accessor = newest_ = made(cJSON_CreateObject());
+  push(accessors_, accessor);
   set(accessor, "bufferView", static_cast<double>(view));
   set(accessor, "componentType", static_cast<double>(component_type));
   set(accessor, "count", static_cast<double>(count));
@@ -146,7 +150,6 @@ int64_t Editor::add(const Floats &values, size_t width, bool attribute, bool bou
   static const char *const types[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
   int64_t number = add_list(values.data(), values.size() * sizeof(float), ORB_GLTF_FLOAT, values.size() / width,
                             types[width - 1], attribute);
-  cJSON *accessor = cJSON_GetArrayItem(accessors_, static_cast<int>(number));
   if (bounded) {
     double low[4], high[4];
     for (size_t k = 0; k < width; k++) {
@@ -158,8 +161,8 @@ int64_t Editor::add(const Floats &values, size_t width, bool attribute, bool bou
       low[k] = static_cast<double>(least);
       high[k] = static_cast<double>(greatest);
     }
-    set(accessor, "min", cJSON_CreateDoubleArray(low, static_cast<int>(width)));
-    set(accessor, "max", cJSON_CreateDoubleArray(high, static_cast<int>(width)));
+    set(newest_, "min", cJSON_CreateDoubleArray(low, static_cast<int>(width)));
+    set(newest_, "max", cJSON_CreateDoubleArray(high, static_cast<int>(width)));
   }
   return number;
 }

@@ -25,7 +25,10 @@ inline cJSON *editable(const cJSON *item) {
 void set(cJSON *object, const char *key, cJSON *value);
 void set(cJSON *object, const char *key, double value);
 
-/* Appends to an array; returns the index. */
+/* Appends to an array. O(1). */
+void push(cJSON *array, cJSON *value);
+
+/* The same; returns the index, for which it counts the array. */
 int64_t append(cJSON *array, cJSON *value);
 
 /* The array of this name; made if it is absent. */
@@ -55,7 +58,7 @@ class Editor {
 
  private:
   orb_context *ctx_;
-  cJSON *doc_, *accessors_, *views_;
+  cJSON *doc_, *accessors_, *views_, *newest_ = nullptr; /* newest: of the accessors */
   int64_t accessor_count_, view_count_;
   Bytes first_;
   orb_buffer added_ = {};

@@ -4,6 +4,7 @@
 
 #include "format/gltf_blocks.hh"
 #include "format/gltf_parse.hh"
+#include "orbmorph/utf8.h"
 
 extern "C" {
 #include "base/memory.h"
@@ -13,10 +14,13 @@ namespace gltf {
 
 namespace {
 
+const size_t CHECK_EVERY = 4096; /* targets between two checks for cancellation */
+
 struct Given {
   orb_context *ctx;
   Document document;
   Buffers buffers;
+  List meshes;
   std::vector<Block> blocks;
 
   Given(orb_context *context, const unsigned char *bytes, size_t size)
@@ -24,6 +28,7 @@ struct Given {
         document(context, bytes, size, size >= 4 && std::memcmp(bytes, "glTF", 4) == 0),
         buffers(context) {
     buffers.load(document.root(), document.chunk(), size);
+    meshes = array_of(document.root(), "meshes");
     blocks = blocks_of(document.root());
   }
 
@@ -84,8 +89,7 @@ void read_sets(const Given &given, const orb_given_file &file, const std::string
 }
 
 std::string title_of(const Given &given, size_t mesh) {
-  const cJSON *item = cJSON_GetArrayItem(member(given.document.root(), "meshes"), static_cast<int>(mesh));
-  return "mesh " + std::to_string(mesh) + " (\"" + text_of(item, "name").substr(0, 60) + "\")";
+  return "mesh " + std::to_string(mesh) + " (\"" + text_of(given.meshes[mesh], "name").substr(0, 60) + "\")";
 }
 
 /* The skin with which the nodes show each mesh that is used; NONE: without one. */
@@ -199,11 +203,13 @@ void read_skin(const Given &given, const orb_given_file &file, orb_given_skin *o
 
 /* The names of the targets of a mesh that has `count`. */
 std::vector<std::string> target_names(const Given &given, size_t mesh, size_t count) {
-  const cJSON *item = cJSON_GetArrayItem(member(given.document.root(), "meshes"), static_cast<int>(mesh));
-  const cJSON *list = member(member(item, "extras"), "targetNames");
+  const cJSON *list = member(member(given.meshes[mesh], "extras"), "targetNames");
+  const cJSON *name = cJSON_IsArray(list) ? list->child : nullptr;
   std::vector<std::string> out;
-  for (size_t k = 0; k < count; k++) {
-    const cJSON *name = cJSON_IsArray(list) ? cJSON_GetArrayItem(list, static_cast<int>(k)) : nullptr;
+  for (size_t k = 0; k < count; k++, name = name ? name->next : nullptr) {
+    if (k % CHECK_EVERY == 0) {
+      must(orb_context_check(given.ctx));
+    }
     bool is_text = cJSON_IsString(name) && *name->valuestring;
     out.push_back(is_text ? std::string(name->valuestring) : "target " + std::to_string(k));
   }
@@ -244,13 +250,16 @@ void read_targets(const Given &given, const orb_given_file &file, orb_given_targ
     const List targets = array_of(block->primitive, "targets");
     const std::vector<std::string> names = target_names(given, block->mesh, targets.size());
     for (size_t k = 0; k < targets.size(); k++) {
+      if (k % CHECK_EVERY == 0) {
+        must(orb_context_check(given.ctx));
+      }
       if (!known.count(names[k])) {
         if (out->count == ORB_GIVEN_TARGETS) {
           throw Fault{ORB_E_TOO_LARGE,
                       "\"transfer\" takes at most " + std::to_string(ORB_GIVEN_TARGETS) + " morph targets of a file."};
         }
         known[names[k]] = out->count;
-        std::snprintf(out->names[out->count], ORB_NAME_MAX, "%s", names[k].c_str());
+        (void)orb_utf8_copy(out->names[out->count], ORB_NAME_MAX, names[k].c_str());
         size_t count = 3 * static_cast<size_t>(file.vertex_count);
         float *moves = out->moves[out->count++] = allocate<float>(given.ctx, count);
         std::fill_n(moves, count, 0.0f);
@@ -384,7 +393,7 @@ extern "C" void orb_given_charts_free(orb_context *ctx, orb_given_charts *charts
 
 extern "C" orb_status orb_given_last_targets(orb_context *ctx, const unsigned char *bytes, size_t size,
                                              const int32_t *on_surface, int32_t vertex_count, int32_t count,
-                                             char (*names)[ORB_NAME_MAX]) {
+                                             orb_given_name *names) {
   return gltf::guarded(ctx, size, [&] {
     gltf::Given given(ctx, bytes, size);
     for (const gltf::Block &block : given.blocks) {
@@ -398,7 +407,7 @@ extern "C" orb_status orb_given_last_targets(orb_context *ctx, const unsigned ch
       int32_t all = static_cast<int32_t>(gltf::array_of(block.primitive, "targets").size());
       const std::vector<std::string> found = gltf::target_names(given, block.mesh, static_cast<size_t>(all));
       for (int32_t k = 0; k < count && all >= count; k++) {
-        std::snprintf(names[k], ORB_NAME_MAX, "%s", found[static_cast<size_t>(all - count + k)].c_str());
+        (void)orb_utf8_copy(names[k], sizeof names[k], found[static_cast<size_t>(all - count + k)].c_str());
       }
       return;
     }

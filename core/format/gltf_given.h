@@ -68,11 +68,14 @@ ORB_MUST_CHECK orb_status orb_given_charts_read(orb_context *ctx, const unsigned
                                                 orb_given_charts *out);
 void orb_given_charts_free(orb_context *ctx, orb_given_charts *charts);
 
+/* A name in an asset: one that was given, and a number that makes it unique. */
+typedef char orb_given_name[ORB_NAME_MAX + 32];
+
 /* The names of the last `count` targets of a document's mesh on the surface; names that it does not give stay as they
  * are. on_surface: of its vertices, −1: not on it. */
 ORB_MUST_CHECK orb_status orb_given_last_targets(orb_context *ctx, const unsigned char *bytes, size_t size,
                                                  const int32_t *on_surface, int32_t vertex_count, int32_t count,
-                                                 char (*names)[ORB_NAME_MAX]);
+                                                 orb_given_name *names);
 
 #ifdef __cplusplus
 }

@@ -256,7 +256,7 @@ struct Keeper {
     cJSON *targets = array_in(editable(primitive), "targets");
     for (int32_t k = 0; k < shapes.target_count; k++) {
       cJSON *target = made(cJSON_CreateObject());
-      append(targets, target);
+      push(targets, target);
       int64_t position =
           moves_it ? editor->add(moves(from, count, frame, k), 3, true, true) : zero_target(editor, count);
       set(target, "POSITION", static_cast<double>(position));
@@ -286,9 +286,9 @@ struct Keeper {
     const cJSON *old = member(extras, "targetNames");
     std::vector<std::string> names;
     std::set<std::string> taken;
-    for (size_t k = 0; k < had; k++) {
-      const cJSON *name = cJSON_IsArray(old) ? cJSON_GetArrayItem(old, static_cast<int>(k)) : nullptr;
-      names.push_back(cJSON_IsString(name) ? name->valuestring : "target " + std::to_string(k));
+    const cJSON *given = cJSON_IsArray(old) ? old->child : nullptr;
+    for (size_t k = 0; k < had; k++, given = given ? given->next : nullptr) {
+      names.push_back(cJSON_IsString(given) ? given->valuestring : "target " + std::to_string(k));
       taken.insert(names.back());
     }
     for (int32_t k = 0; k < shapes.target_count; k++) {
@@ -302,7 +302,7 @@ struct Keeper {
     cJSON *list = made(cJSON_CreateArray());
     set(extras, "targetNames", list);
     for (const std::string &name : names) {
-      append(list, cJSON_CreateString(name.c_str()));
+      push(list, cJSON_CreateString(name.c_str()));
     }
     set(extras, "firstShape", static_cast<double>(had));
   }

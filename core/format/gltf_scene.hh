@@ -12,6 +12,13 @@ struct Matrix {
   double m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; /* column-major */
   bool identity = true;
 
+  Matrix() = default;
+  explicit Matrix(const double values[16]) {
+    const Matrix one;
+    std::memcpy(m, values, sizeof m);
+    identity = std::memcmp(m, one.m, sizeof m) == 0;
+  }
+
   double at(int row, int column) const { return m[4 * column + row]; }
 
   double determinant() const {

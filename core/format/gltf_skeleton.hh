@@ -1,17 +1,46 @@
-/* A skin of one glTF document, copied into another: its joints, the nodes above them, its inverse bind matrices. */
+/* The skeleton of a skin: its joints and the nodes above them, as a document has them at rest. */
 #ifndef ORB_FORMAT_GLTF_SKELETON_HH
 #define ORB_FORMAT_GLTF_SKELETON_HH
 
-#include "format/gltf_edit.hh"
+#include "format/gltf_accessor.hh"
 #include "format/gltf_scene.hh"
-#include "format/gltf_skin.h"
 
 namespace gltf {
 
-/* Adds the nodes and the skin to the document that is edited; returns the number of the skin. shown: the transform of
- * the mesh that gets it. The joints stand where the shape was moved to, and in their rest the mesh stays in place where
- * it did so in the source. */
-int64_t copy_skin(orb_context *ctx, cJSON *doc, Editor *editor, const orb_added_skin &from, const Matrix &shown);
+using Matrices = std::vector<Matrix, Charged<Matrix>>;
+using Indices = std::vector<int64_t, Charged<int64_t>>;
+
+const size_t CHECK_EVERY = 4096; /* nodes or joints between two checks for cancellation */
+
+inline void check_sometimes(orb_context *ctx, size_t step) {
+  if (step % CHECK_EVERY == 0) {
+    must(orb_context_check(ctx));
+  }
+}
+
+/* Throws where the nodes of the document are no tree. */
+struct Skeleton {
+  Skeleton(orb_context *context, const cJSON *document, int32_t number);
+
+  const Matrix &world(int64_t node) const { return worlds[static_cast<size_t>(node)]; }
+  Matrices inverse_binds(const Buffers &buffers) const;
+
+  orb_context *ctx;
+  const cJSON *skin;
+  List nodes;
+  Indices joints;  /* their nodes */
+  Indices above;   /* the parent of each node, or NONE */
+  Indices kept;    /* the nodes of the skeleton, by their numbers */
+  Indices order;   /* the same, each after its parent */
+  Matrices worlds; /* of each node of the skeleton; the others have the identity */
+
+ private:
+  void link_nodes();
+  void place_nodes();
+};
+
+/* Of an affine transform. Throws where it flattens. */
+Matrix inverse(const Matrix &matrix);
 
 }  // namespace gltf
 

@@ -5,6 +5,16 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* The closed surface of the asset, as it is on the document's shape and on the base; both in the coordinates of the
+ * asset. */
+typedef struct orb_skin_surface {
+  int32_t count;                /* of its vertices; 0: the skeleton stays as it is */
+  const double *before, *after; /* 3 a vertex: on the shape, on the base */
+  const double *area;           /* of the base, that each vertex stands for */
+  const uint16_t (*joints)[4];
+  const float (*weights)[4]; /* the sum is 1 */
+} orb_skin_surface;
+
 /* A skin of a document, and which of its joints move the vertices. */
 typedef struct orb_added_skin {
   const unsigned char *bytes; /* the document; NULL: no skin is added */
@@ -13,6 +23,7 @@ typedef struct orb_added_skin {
   double place[16], moved[16]; /* from its meshes to its scene, and from there to the asset; column-major */
   const uint16_t *joints;      /* 4 a vertex of all triangle primitives */
   const float *weights;        /* likewise; the sum is 1 */
+  orb_skin_surface surface;
 } orb_added_skin;
 
 #endif

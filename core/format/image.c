@@ -14,7 +14,7 @@
 #include "base/memory.h"
 
 static orb_status unreadable(orb_context *ctx) {
-  return orb_fail(ctx, ORB_E_CORRUPT, "The image is no PNG or JPEG that can be read.");
+  return orb_fail(ctx, ORB_E_CORRUPT, "The image cannot be read as PNG or JPEG.");
 }
 
 static orb_status allocate(orb_context *ctx, size_t width, size_t height, orb_pixels *out) {
@@ -28,24 +28,85 @@ static orb_status allocate(orb_context *ctx, size_t width, size_t height, orb_pi
   return out->rgba ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
+/* What a PNG is read from. */
+typedef struct png_source {
+  orb_context *ctx;
+  const unsigned char *bytes;
+  size_t left;
+  orb_status status; /* of a check for cancellation */
+} png_source;
+
+/* The library asks for a few KiB at a time, so this is also where cancellation is noticed. */
+static void on_png_read(png_structp png, png_bytep out, size_t size) {
+  png_source *source = png_get_io_ptr(png);
+  source->status = orb_context_check(source->ctx);
+  if (source->status != ORB_OK || size > source->left) {
+    png_error(png, "cancelled, or cut short");
+  }
+  memcpy(out, source->bytes, size);
+  source->bytes += size;
+  source->left -= size;
+}
+
+static void on_png_message(png_structp png, png_const_charp text) {
+  (void)png;
+  (void)text;
+}
+
+static void on_png_error(png_structp png, png_const_charp text) {
+  (void)text;
+  png_longjmp(png, 1);
+}
+
+/* Every kind of PNG as 8 bits of red, green, blue and alpha. */
+static int expand_png(png_structp png, png_infop info) {
+  png_set_scale_16(png);
+  png_set_expand(png);
+  png_set_gray_to_rgb(png);
+  png_set_add_alpha(png, 255, PNG_FILLER_AFTER);
+  int passes = png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+  return passes;
+}
+
+/* A function of its own: see jpeg_rows(). */
+static orb_status png_rows(orb_context *ctx, png_structp png, png_infop info, png_source *source, orb_pixels *out) {
+  if (setjmp(png_jmpbuf(png))) {
+    return source->status != ORB_OK ? source->status : unreadable(ctx);
+  }
+  png_set_benign_errors(png, 1);
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, NULL, -1); /* texts, profiles, facts about colours */
+  png_set_read_fn(png, source, on_png_read);
+  png_read_info(png, info);
+  ORB_TRY(allocate(ctx, png_get_image_width(png, info), png_get_image_height(png, info), out));
+  for (int pass = expand_png(png, info); pass > 0; pass--) {
+    ORB_ASSERT(png_get_rowbytes(png, info) == 4 * (size_t)out->width);
+    for (size_t y = 0; y < (size_t)out->height; y++) {
+      png_read_row(png, out->rgba + 4 * (size_t)out->width * y, NULL);
+    }
+  }
+  png_read_end(png, NULL);
+  return ORB_OK;
+}
+
 static orb_status decode_png(orb_context *ctx, const unsigned char *bytes, size_t size, orb_pixels *out) {
-  png_image image = {.version = PNG_IMAGE_VERSION};
-  if (!png_image_begin_read_from_memory(&image, bytes, size)) {
-    return unreadable(ctx);
-  }
-  image.format = PNG_FORMAT_RGBA;
-  image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;
-  orb_status status = allocate(ctx, image.width, image.height, out);
-  if (status == ORB_OK && !png_image_finish_read(&image, NULL, out->rgba, 0, NULL)) {
-    status = unreadable(ctx);
-  }
-  png_image_free(&image);
+  png_source source = {ctx, bytes, size, ORB_OK};
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, NULL, on_png_error, on_png_message);
+  png_infop info = png ? png_create_info_struct(png) : NULL;
+  orb_status status = info ? png_rows(ctx, png, info, &source, out) : ORB_E_NO_MEMORY;
+  png_destroy_read_struct(&png, &info, NULL);
   return status;
 }
 
+/* Scans of a progressive picture, each of which takes as long as a whole one: programs write about ten. */
+enum { SCANS_MOST = 100 };
+
 typedef struct jpeg_failure {
   struct jpeg_error_mgr manager;
+  struct jpeg_progress_mgr progress;
   jmp_buf back;
+  orb_context *ctx;
+  orb_status status; /* of a check for cancellation */
 } jpeg_failure;
 
 static void on_jpeg_error(j_common_ptr info) {
@@ -54,6 +115,15 @@ static void on_jpeg_error(j_common_ptr info) {
 
 static void on_jpeg_message(j_common_ptr info) {
   (void)info;
+}
+
+/* The library calls it for each row of blocks of each scan. */
+static void on_jpeg_progress(j_common_ptr info) {
+  jpeg_failure *failure = (jpeg_failure *)info->err;
+  failure->status = orb_context_check(failure->ctx);
+  if (failure->status != ORB_OK || ((j_decompress_ptr)info)->input_scan_number > SCANS_MOST) {
+    longjmp(failure->back, 1);
+  }
 }
 
 /* From three bytes a pixel to four, in place. */
@@ -71,9 +141,10 @@ static void widen_row(unsigned char *row, size_t width) {
 static orb_status jpeg_rows(orb_context *ctx, struct jpeg_decompress_struct *info, jpeg_failure *failure,
                             const unsigned char *bytes, size_t size, orb_pixels *out, void **held) {
   if (setjmp(failure->back)) {
-    return unreadable(ctx);
+    return failure->status != ORB_OK ? failure->status : unreadable(ctx);
   }
   jpeg_create_decompress(info);
+  info->progress = &failure->progress;
   jpeg_mem_src(info, bytes, (unsigned long)size);
   jpeg_read_header(info, TRUE);
   info->out_color_space = JCS_RGB;
@@ -94,7 +165,7 @@ static orb_status jpeg_rows(orb_context *ctx, struct jpeg_decompress_struct *inf
 
 static orb_status decode_jpeg(orb_context *ctx, const unsigned char *bytes, size_t size, orb_pixels *out) {
   struct jpeg_decompress_struct info = {0};
-  jpeg_failure failure;
+  jpeg_failure failure = {.progress.progress_monitor = on_jpeg_progress, .ctx = ctx};
   void *held = NULL;
   info.err = jpeg_std_error(&failure.manager);
   failure.manager.error_exit = on_jpeg_error;
@@ -135,20 +206,14 @@ static void on_png_flush(png_structp png) {
   (void)png;
 }
 
-static void on_png_message(png_structp png, png_const_charp text) {
-  (void)png;
-  (void)text;
-}
-
-static void on_png_error(png_structp png, png_const_charp text) {
-  (void)text;
-  png_longjmp(png, 1);
-}
-
 /* row: room for a row without alpha. */
-static void write_rows(png_structp png, const orb_pixels *pixels, int has_alpha, unsigned char *row) {
+static void write_rows(png_structp png, png_sink *sink, const orb_pixels *pixels, int has_alpha, unsigned char *row) {
   size_t width = (size_t)pixels->width;
   for (size_t y = 0; y < (size_t)pixels->height; y++) {
+    sink->status = orb_context_check(sink->ctx);
+    if (sink->status != ORB_OK) {
+      png_error(png, "cancelled");
+    }
     const unsigned char *from = pixels->rgba + 4 * width * y;
     for (size_t x = 0; !has_alpha && x < width; x++) {
       memcpy(row + 3 * x, from + 4 * x, 3);
@@ -167,7 +232,7 @@ static int write_png(png_structp png, png_infop info, png_sink *sink, const orb_
                has_alpha ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
-  write_rows(png, pixels, has_alpha, row);
+  write_rows(png, sink, pixels, has_alpha, row);
   png_write_end(png, NULL);
   return 1;
 }

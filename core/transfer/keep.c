@@ -5,6 +5,7 @@
 #include "format/gltf_keep.h"
 #include "mesh/normals.h"
 #include "transfer/materials.h"
+#include "transfer/names.h"
 #include "transfer/pack.h"
 #include "transfer/template.h"
 
@@ -60,7 +61,7 @@ static orb_status describe(orb_context *ctx, const orb_draft *draft, const orb_d
   if (keys > 0) {
     orb_draft_keys(draft, k->key_frames, k->key_times);
   }
-  orb_draft_names(draft, names, k->texts, k->names);
+  ORB_TRY(orb_draft_names(ctx, draft, names, k->texts, k->names));
   if (draft->options->normals) {
     ORB_TRY(make_normals(ctx, draft, k));
   }

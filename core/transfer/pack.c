@@ -4,7 +4,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -12,6 +11,7 @@
 #include "base/memory.h"
 #include "format/gltf_write.h"
 #include "transfer/materials.h"
+#include "transfer/names.h"
 
 /* The animation, in seconds: how long a shape stays, and how long the way to the next one takes. */
 static const double HOLD = 0.5, MOVE = 1.5;
@@ -236,34 +236,6 @@ static orb_status write_scene(packer *pack, orb_gltf_scene *scene, orb_gltf_prim
   return orb_gltf_write(pack->ctx, scene, &pack->binary, out);
 }
 
-void orb_draft_names(const orb_draft *draft, const char *const *names, orb_target_name *texts, const char **out) {
-  int32_t shapes = draft->shape_count, steps = draft->options->path_steps;
-  for (int32_t s = 0; s < shapes; s++) {
-    int same = 0;
-    for (int32_t r = 1; r < s; r++) {
-      same += strcmp(names[r], names[s]) == 0;
-    }
-    snprintf(texts[s], sizeof texts[s], same ? "%.127s (%d)" : "%.127s", names[s], same + 1);
-  }
-  for (int32_t f = shapes; f < shapes + draft->between_count; f++) {
-    int32_t gap = (f - shapes) / steps, step = (f - shapes) % steps;
-    snprintf(texts[f], sizeof texts[f], "%.127s to %.127s %d/%d", names[gap], names[gap + 1], step + 1, steps + 1);
-  }
-  for (int32_t f = shapes + draft->between_count; f < draft->frame_count; f++) {
-    const char *name = draft->options->targets[f - shapes - draft->between_count].name;
-    snprintf(texts[f], sizeof texts[f], "%.127s", name);
-    for (int32_t r = 1, number = 2; r < f; r++) {
-      if (strcmp(texts[r], texts[f]) == 0) {
-        snprintf(texts[f], sizeof texts[f], "%.127s (%d)", name, number++);
-        r = 0; /* the new name may be taken, too */
-      }
-    }
-  }
-  for (int32_t f = 0; f < draft->frame_count; f++) {
-    out[f] = texts[f];
-  }
-}
-
 orb_status orb_draft_write(orb_context *ctx, const orb_draft *draft, const char *const *names, orb_asset_facts *facts,
                            orb_buffer *out) {
   packer pack = {.ctx = ctx, .draft = draft, .accessor_capacity = 2 + draft->part_count * (6 + 4 * draft->frame_count)};
@@ -282,10 +254,12 @@ orb_status orb_draft_write(orb_context *ctx, const orb_draft *draft, const char 
   const char **all_names = ORB_NEW(ctx, const char *, draft->frame_count);
   orb_status status = ORB_E_NO_MEMORY;
   if (pack.accessors && pack.scratch && primitives && targets && texts && all_names) {
-    orb_draft_names(draft, names, texts, all_names);
-    scene.name = all_names[0];
+    scene.name = texts[0];
     scene.target_names = all_names + 1;
-    status = orb_draft_materials_add(ctx, draft, &pack.binary, &materials, &scene);
+    status = orb_draft_names(ctx, draft, names, texts, all_names);
+    if (status == ORB_OK) {
+      status = orb_draft_materials_add(ctx, draft, &pack.binary, &materials, &scene);
+    }
     if (status == ORB_OK) {
       status = write_scene(&pack, &scene, primitives, targets, facts, out);
     }

@@ -14,9 +14,4 @@ ORB_MUST_CHECK orb_status orb_draft_write(orb_context *ctx, const orb_draft *dra
  */
 int32_t orb_draft_keys(const orb_draft *draft, int32_t *frames, double *times);
 
-/* The names of the frames: of the shapes, the later ones made unique, then of the in-betweens. texts and out:
- * frame_count; out refers to texts. */
-typedef char orb_target_name[2 * ORB_NAME_MAX + 32];
-void orb_draft_names(const orb_draft *draft, const char *const *names, orb_target_name *texts, const char **out);
-
 #endif

@@ -183,6 +183,7 @@ void submit_wanted(request *r, const wanted_result *wish) {
                               .priority = access_priority(r),
                               .cost = wish->cost,
                               .listed = 1,
+                              .trace = r->span,
                               .hook = hook.url[0] ? &hook : NULL};
   job *j = NULL;
   int fresh = 0;
@@ -206,6 +207,7 @@ void submit_wanted(request *r, const wanted_result *wish) {
     callers_recount(r->srv->callers, access_tenant(r)); /* the job may have made it an owner of further meshes */
   }
   log_submitted(r, j, fresh);
+  memcpy(r->job, job_id(j), sizeof r->job);
   if (r->waits_for_what == WAIT_ASSET || r->wait_until > orb_clock_ms()) {
     r->waits_for = j;
     r->phase = PHASE_WAIT;

@@ -75,7 +75,8 @@ typedef struct server {
   int64_t decoding;    /* bytes held by the decoders of bodies; __atomic */
   int64_t started;
   int needs_token;
-  int unfit; /* the catalogue refused to open: see STORE_UNFIT */
+  int works_only; /* the role work: answers only what is about the node itself */
+  int unfit;      /* the catalogue refused to open: see STORE_UNFIT */
   deliverer *outbox;
   scrub *scrub;                            /* NULL: off */
   networks webhook_allowed, fetch_allowed; /* besides public addresses */
@@ -143,11 +144,13 @@ struct request {
   int cancels; /* the request cancels waits_for; refused if the job ends in another way */
 
   unsigned status;
-  coding coded;           /* of the answer */
-  const encoded *encoded; /* the answer in memory, referenced; NULL once a response holds it */
-  char etag[48];          /* of the form that reply_choose() has chosen */
-  int64_t sends;          /* bytes of the response's body; event streams count theirs as they send */
-  char trace[TRACE_SIZE]; /* traceparent, if the caller sent a well-formed one */
+  coding coded;              /* of the answer */
+  const encoded *encoded;    /* the answer in memory, referenced; NULL once a response holds it */
+  char etag[48];             /* of the form that reply_choose() has chosen */
+  int64_t sends;             /* bytes of the response's body; event streams count theirs as they send */
+  char trace[TRACE_SIZE];    /* traceparent, if the caller sent a well-formed one */
+  char span[TRACE_SIZE];     /* of this request; "": it is not recorded */
+  char job[API_JOB_ID_SIZE]; /* that it submitted; "": none */
   struct MHD_Response *response;
   char target[]; /* of the request line, as sent */
 };

@@ -156,14 +156,14 @@ static int listen_internet(const char *where, listener *out) {
   return fine && describe(out, host);
 }
 
-int listen_open(const config *options, listener *out) {
+int listen_open(const config *options, const char *where, listener *out) {
   memset(out, 0, sizeof *out);
   out->fd = -1;
   int passed = take_passed(out);
   int fine = passed != 0 ? passed > 0
-             : strncmp(options->listen, "unix:", 5) == 0
-                 ? listen_unix(options->listen + 5, (mode_t)strtol(options->socket_mode, NULL, 8), out)
-                 : listen_internet(options->listen, out);
+             : strncmp(where, "unix:", 5) == 0
+                 ? listen_unix(where + 5, (mode_t)strtol(options->socket_mode, NULL, 8), out)
+                 : listen_internet(where, out);
   if (!fine && out->fd >= 0) {
     close(out->fd);
     out->fd = -1;

@@ -15,8 +15,9 @@ typedef struct listener {
   ino_t inode;
 } listener;
 
-/* 1, or 0 with the reason logged. A socket from systemd (LISTEN_FDS, sd_listen_fds(3)) overrides `listen`. */
-int listen_open(const config *options, listener *out);
+/* Listens on ADDR:PORT or unix:PATH. 1, or 0 with the reason logged. A socket from systemd (LISTEN_FDS,
+ * sd_listen_fds(3)) takes the place of the address. */
+int listen_open(const config *options, const char *where, listener *out);
 /* Unlinks a Unix socket. Does not close the descriptor: libmicrohttpd owns it. */
 void listen_remove(listener *of);
 

@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "api/landmark_codec.h"
+#include "api/transfer_codec.h"
 #include "http/http.h"
 #include "metrics.h"
 
@@ -168,6 +169,7 @@ static int add_shapes(const request *r, cJSON *body, api_problem *problem) {
 /* The body of the POST that this recipe stands for. */
 static int add_members(const request *r, cJSON *body, api_problem *problem) {
   const char *landmarks = query_of(r, "landmarks"), *preset = query_of(r, "preset");
+  const char *transfer = query_of(r, "transfer");
   if (landmarks && strcmp(landmarks, "auto") == 0) {
     cJSON_AddStringToObject(body, "landmarks", "auto");
   } else if (landmarks) {
@@ -175,6 +177,9 @@ static int add_members(const request *r, cJSON *body, api_problem *problem) {
   }
   if (preset) {
     cJSON_AddStringToObject(object_of(object_of(body, "embedding"), "options"), "preset", preset);
+  }
+  if (transfer && !cJSON_AddItemToObject(body, "transfer", api_transfer_parse(transfer))) {
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
     const char *text = query_of(r, members[i].parameter);

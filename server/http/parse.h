@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "trace/trace.h"
+
 /* A Range header for a file of `size` bytes. −1: outside the file; 0: ignored, respond with the whole file (RFC 9110
  * section 14.2); 1: [*first, *first + *length). */
 int parse_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length);
@@ -38,7 +40,7 @@ extern const char PARSE_PAGE_TOKEN[]; /* the sentence for an invalid page token 
 int parse_id_prefix(const char *text);
 
 /* A traceparent of W3C Trace Context, version 00. 0 for any other text. */
-enum { TRACE_SIZE = 56 };
+enum { TRACE_SIZE = TRACE_PARENT };
 int parse_trace(const char *text, char out[TRACE_SIZE]);
 
 #endif

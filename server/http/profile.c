@@ -88,7 +88,16 @@ static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *p
   return status == ORB_OK;
 }
 
+enum { LOST_TRIES = 3 };
+
 /* Publishes the object before the row names it. */
+static store_result put_profile(request *r, object_kind kind, const char *sha, const orb_buffer *bytes) {
+  store_result stored = objects_put(r->srv->store, kind, r->id, bytes->data, bytes->size);
+  FAULT_POINT("profile-published");
+  return stored == STORE_OK ? catalogue_add_profile(r->srv->cat, r->id, r->profile - 1, sha, (int64_t)bytes->size)
+                            : stored;
+}
+
 static store_result store_profile(request *r, const orb_buffer *bytes) {
   server *srv = r->srv;
   char sha[API_ID_SIZE];
@@ -98,10 +107,10 @@ static store_result store_profile(request *r, const orb_buffer *bytes) {
   }
   api_id_of_text((const char *)bytes->data, bytes->size, sha);
   objects_hold(srv->store);
-  store_result stored = objects_put(srv->store, kind, r->id, bytes->data, bytes->size);
-  FAULT_POINT("profile-published");
-  if (stored == STORE_OK) {
-    stored = catalogue_add_profile(srv->cat, r->id, r->profile - 1, sha, (int64_t)bytes->size);
+  store_result stored = put_profile(r, kind, sha, bytes);
+  for (int i = 0; stored == STORE_LOST && i < LOST_TRIES; i++) {
+    objects_hold_again(srv->store);
+    stored = put_profile(r, kind, sha, bytes);
   }
   if (stored == STORE_NOT_FOUND) { /* no other thread can have published it: this one has the flight */
     objects_delete(srv->store, kind, r->id);

@@ -181,6 +181,10 @@ void reply_store(request *r, store_result result) {
     reply_refuse(r, "storage-full", "The server's disk is full; nothing was stored. Free some space and try again.");
   } else if (result == STORE_AWAY) {
     reply_refuse(r, "unavailable", "The store of objects (S3) does not answer; nothing is lost. Try again soon.");
+  } else if (result == STORE_LOST) {
+    reply_refuse(
+        r, "unavailable",
+        "The connection to the catalogue (PostgreSQL) broke before this was stored; nothing is lost. Try again soon.");
   } else if (catalogue_is_away(r->srv->cat)) {
     reply_refuse(r, "unavailable", "The catalogue (PostgreSQL) does not answer; nothing is lost. Try again soon.");
   } else if (objects_is_read_only(r->srv->store)) {

@@ -78,6 +78,11 @@ static void *request_create(void *user, const char *target, struct MHD_Connectio
   return r;
 }
 
+/* A node of the role work. */
+static int is_about_node(const request *r, const char *path) {
+  return access_is_open(path) || (r->route && r->route->id == ROUTE_METRICS);
+}
+
 /* The first call of answer() for a request, with its headers. Leaves a response if the headers alone decide it. */
 static void request_begin(request *r, const char *method, const char *url, const char *version) {
   const char *path = parse_target(url);
@@ -90,11 +95,16 @@ static void request_begin(request *r, const char *method, const char *url, const
   watched_headers(r->watched);
   r->shape = r->route ? route_number(r->route, path) : -1;
   parse_trace(header_of(r, "traceparent"), r->trace);
+  if (!is_about_node(r, path)) {
+    trace_begin(r->trace, r->span);
+  }
   if (!guard_headers(r, version, &problem)) {
     r->closes = 1;
     reply_problem(r, &problem);
   } else if (!access_within_limits(r, path)) {
     return;
+  } else if (r->srv->works_only && !is_about_node(r, path)) {
+    reply_refuse(r, "not-found", "This node runs jobs and serves only /metrics, /livez and /readyz.");
   } else if (!sign_check(r, path, &problem) || !browser_check(r, url, path, &problem) ||
              !access_check(r, path, &problem)) {
     reply_problem(r, &problem);
@@ -156,6 +166,28 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
   return result == MHD_YES && r->phase == PHASE_SEND ? reply_send(r) : result;
 }
 
+static void record_span(const request *r, int64_t took_us) {
+  char name[96], method[16]; /* of a caller, who may send anything */
+  const int64_t end = trace_now_us();
+  const char *where = r->route ? r->route->path : "";
+  snprintf(method, sizeof method, "%s", r->method);
+  snprintf(name, sizeof name, "%s%s%s", method, r->route ? " " : "", where);
+  trace_end(&(trace_span){.self = r->span,
+                          .parent = r->trace,
+                          .name = name,
+                          .kind = TRACE_SERVER,
+                          .start_us = end - took_us,
+                          .end_us = end,
+                          .error = r->status >= 500 ? "the daemon failed"
+                                   : r->status      ? NULL
+                                                    : "no answer was sent",
+                          .attributes = {{"http.request.method", method, 0},
+                                         {"http.response.status_code", NULL, r->status},
+                                         {"orbmorph.request", r->number, 0},
+                                         {r->route ? "http.route" : NULL, where, 0},
+                                         {r->job[0] ? "orbmorph.job" : NULL, r->job, 0}}});
+}
+
 static void completed(void *user, struct MHD_Connection *connection, void **state,
                       enum MHD_RequestTerminationCode code) {
   request *r = *state;
@@ -169,6 +201,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
     *state = NULL;
     return;
   }
+  record_span(r, took);
   int waited = r->waits_for != NULL || (r->route && r->route->id == ROUTE_JOB_EVENTS);
   metrics_request((int)r->status, waited ? -1 : 1e-6 * (double)took);
   if (code == MHD_REQUEST_TERMINATED_COMPLETED_OK && !r->head) {

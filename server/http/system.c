@@ -8,6 +8,7 @@
 #include "metrics.h"
 #include "store/deliveries.h"
 #include "store/usage.h"
+#include "trace/send.h"
 
 enum { TENANTS_SHOWN = 50 };
 
@@ -72,6 +73,15 @@ static void write_tenants(catalogue *cat, api_text *text) {
   }
 }
 
+static void write_traces(api_text *text) {
+  trace_numbers n;
+  trace_count(&n);
+  metrics_family(text, "orbmorph_spans_total", "counter", "Spans of traces, by what became of them.");
+  api_text_printf(text, "orbmorph_spans_total{result=\"sent\"} %lld\norbmorph_spans_total{result=\"dropped\"} %lld\n",
+                  (long long)n.sent, (long long)n.dropped);
+  gauge(text, "orbmorph_spans_waiting", "Spans that are still to be sent.", (double)n.waiting);
+}
+
 static void metrics_away(request *r) {
   server *srv = r->srv;
   api_text text = {0};
@@ -106,6 +116,7 @@ static void metrics_away(request *r) {
   gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system that holds the data folder.",
         (double)objects_free_bytes(srv->store));
   write_scrub(srv->scrub, &text);
+  write_traces(&text);
   gauge(&text, "orbmorph_queue_limit", "Largest number of unfinished jobs.", (double)srv->options->queue_limit);
   gauge(&text, "orbmorph_decoding_bytes", "Bytes held by decoders of compressed bodies.",
         (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));

@@ -6,7 +6,7 @@
 
 #include "wake.h"
 
-/* READERS: of all tenants together. IDLE_MS: a client that sends file after file over a long line comes back within.
+/* READERS: of all tenants together. IDLE_MS: a client that sends file after file over a long line comes back within it.
  * LOOK_MS: how soon an idle one ends once others lack memory. */
 enum { READERS = 8, IDLE_MS = 250, LOOK_MS = 50 };
 enum { FREE, BUSY, IDLE, OVER }; /* over: the thread ends it */

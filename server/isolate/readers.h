@@ -1,10 +1,10 @@
-/* Processes that check small files one after another, each those of one tenant: to start a process costs more than to
- * check a small file.
+/* Processes that check small files one after another. Starting a process costs more than checking a small file. Each
+ * process serves one tenant.
  *
- * Such a process is confined like any other, with the memory of the largest file that it may get, which it holds as
- * long as it lives. It ends when no file of its tenant comes for a moment, after READER_FILES files or READER_WORK_MS
+ * Such a process is confined like any other. As long as it lives, it holds the memory of the largest file that it may
+ * get. It ends when no file of its tenant comes for a moment, after READER_FILES files or READER_WORK_MS
  * of work, and as soon as others lack memory. It never gets a file of another tenant. If it dies after it has read
- * other files, the cause may be one of those: the check is to be repeated in a process of its own.
+ * other files, one of those may be the cause, so the caller repeats the check in a process of its own.
  */
 #ifndef ORB_ISOLATE_READERS_H
 #define ORB_ISOLATE_READERS_H
@@ -21,7 +21,7 @@ enum {
 typedef struct reader {
   isolated process;
   int files;      /* that it has read before this one */
-  int64_t memory; /* to which it is limited beside a file */
+  int64_t memory; /* its limit, without the file */
   /* private */
   int state;
   char *tenant;
@@ -35,9 +35,9 @@ void readers_stop(void);
 
 /* A process for a file of this tenant, or NULL: the check gets a process of its own. memory: that the check needs. */
 reader *reader_take(const char *tenant, budget_part part, int64_t bytes, int64_t memory, orb_context *ctx);
-/* Its check has ended, with an answer. */
+/* The check has ended with an answer. */
 void reader_give(reader *r);
-/* Ends it and returns its status, as isolate_close(). */
+/* Ends the process and returns its status, as isolate_close(). */
 int reader_end(reader *r);
 
 #endif

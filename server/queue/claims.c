@@ -19,7 +19,7 @@ static queue_result result_of(store_result stored, submit_outcome outcome) {
                                      : QUEUE_ERROR;
 }
 
-/* The job of a request in memory before its row is committed, so that no notice about it comes too early. */
+/* Puts the job of a request into memory before its row is committed, so that a notice about it finds the job. */
 static job *prepare(queue *q, const queue_request *request) {
   pthread_mutex_lock(&q->lock);
   job *j = q->stopping ? NULL : job_create(q, request);
@@ -27,7 +27,8 @@ static job *prepare(queue *q, const queue_request *request) {
   return j;
 }
 
-/* Drops a job whose row was not inserted. It may be there nevertheless, if the connection was lost at its commit. */
+/* Drops a job whose row was not inserted. The row may be there nevertheless, if the connection was lost at the commit.
+ */
 static void withdraw(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
   if (j->taken || api_job_ended(j->row.state)) {
@@ -40,7 +41,7 @@ static void withdraw(queue *q, job *j) {
   pthread_mutex_unlock(&q->lock);
 }
 
-/* *again: a job of the same request was there, and is not any more. */
+/* *again: the job of the same request ended just now, so another try finds its result. */
 static queue_result submit_once(queue *q, const queue_request *request, job **out, int *fresh, int *again) {
   const int stopping = q->stopping;
   job *j = prepare(q, request);
@@ -84,7 +85,7 @@ queue_result shared_submit(queue *q, const queue_request *request, job **out, in
   enum { TRIES = 3 };
   int again = 1;
   queue_result result = QUEUE_ERROR;
-  for (int i = 0; i < TRIES && again; i++) { /* it has just ended: the next look finds the result */
+  for (int i = 0; i < TRIES && again; i++) {
     result = submit_once(q, request, out, fresh, &again);
   }
   return again ? QUEUE_ERROR : result;
@@ -126,17 +127,29 @@ static int may_claim(const queue *q, queue_lane lane, claim_wish *wish) {
   return (!q->exclusive || q->isolated) && wish->most_cost >= 0;
 }
 
+/* Takes what a claimed row says into a job that is in memory already. Id, key, owner and request are the same, and
+ * threads that hold the job read them without the lock. */
+static void update_row(job_row *known, const job_row *claimed) {
+  known->seq = claimed->seq;
+  known->attempt = claimed->attempt;
+  known->crashes = claimed->crashes;
+  known->suspect = claimed->suspect;
+  known->alone = claimed->alone;
+  known->listed = claimed->listed;
+  known->priority = claimed->priority;
+  known->started = claimed->started;
+}
+
 /* The job in memory of a claim; takes over the row. NULL: out of memory. */
 static job *enter(queue *q, job_claim *c) {
   job *j = table_with_id(q, c->row.id);
   char *problem = c->row.problem; /* of a job that it waited for */
   c->row.problem = NULL;
   if (j) {
-    char *request = j->row.request;
+    update_row(&j->row, &c->row);
     free(c->row.request);
     free(j->row.problem);
-    j->row = c->row;
-    j->row.request = request;
+    j->row.problem = NULL;
   } else if ((j = calloc(1, sizeof *j))) {
     j->refs = 1;
     j->row = c->row;
@@ -152,19 +165,13 @@ static job *enter(queue *q, job_claim *c) {
   j->running = 1;
   j->cancel |= c->cancel;
   j->needs_all = c->big;
+  j->ready = c->ready;
   j->stage[0] = 0;
   j->last_event = c->last_event > j->last_event ? c->last_event : j->last_event;
   return j;
 }
 
-static int share_of_cores(const queue *q, const job *j, int64_t beside) {
-  const int64_t wanted = q->running - q->fetching + beside; /* j is among those that run */
-  const int64_t most = wanted < q->options.workers ? wanted : q->options.workers;
-  const int share = most > 0 ? (int)most : 1;
-  return j->is_guest || q->options.cores / share < 1 ? 1 : q->options.cores / share;
-}
-
-/* Gives a claim back. The lock is held, but not meanwhile. */
+/* Gives a claim back, and releases the lock for that time. */
 static job *refuse(queue *q, job_claim *c) {
   pthread_mutex_unlock(&q->lock);
   store_result stored = catalogue_job_release(q->cat, c->row.id, c->row.attempt);
@@ -177,7 +184,7 @@ static job *refuse(queue *q, job_claim *c) {
   return NULL;
 }
 
-/* Asks the catalogue for a job; without the lock meanwhile. NULL: there is none. */
+/* Asks the catalogue for a job, and releases the lock for that time. NULL: there is none. */
 static job *claim(queue *q, queue_lane lane, const claim_wish *wish, int *threads) {
   sharing *s = q->shared;
   job_claim claimed;
@@ -202,7 +209,7 @@ static job *claim(queue *q, queue_lane lane, const claim_wish *wish, int *thread
   }
   schedule_enter(q, lane, j, orb_clock_ms());
   int fits = schedule_take_memory(q, lane, j);
-  *threads = share_of_cores(q, j, claimed.beside);
+  *threads = schedule_threads(q, j, claimed.beside);
   s->look[lane] = 1; /* there may be more */
   pthread_cond_broadcast(&q->work);
   if (fits && !q->stopping) {

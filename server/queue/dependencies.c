@@ -23,7 +23,8 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const c
                              .owner = j->row.owner,
                              .charged = j->row.charged,
                              .cost = costs[i],
-                             .priority = j->row.priority};
+                             .priority = j->row.priority,
+                             .trace = j->row.trace};
     result = queue_submit(q, &request, &needed, NULL);
     queue_release(q, needed);
   }
@@ -40,7 +41,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const c
   if (j->cancel) { /* cancelled in the meantime */
     j->waits_for = 0;
     pthread_mutex_unlock(&q->lock);
-    queue_finish(q, j, API_JOB_CANCELLED, NULL, NULL);
+    queue_finish(q, j, API_JOB_CANCELLED, NULL);
     return QUEUE_OK;
   }
   schedule_leave(q, j);

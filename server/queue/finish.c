@@ -12,7 +12,7 @@ static void release_dependents(queue *q, job *ended) {
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
       if (is_for(ended, j->dependencies[d], j->row.owner)) {
-        j->waits_for--;
+        j->ready = --j->waits_for ? j->ready : unix_ms();
         if (ended->row.state == API_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
           j->dependency_problem = strdup(ended->row.problem);
         }
@@ -141,11 +141,25 @@ static void cancel_needless(queue *q, job *of) {
   }
 }
 
-static void finish_as(queue *q, job *j, job_end *end) {
+enum { LOST_TRIES = 3 };
+
+/* Tries again while the database is away: nothing is lost. */
+static store_result end_surely(queue *q, job *j, job_end *end, const queue_made *made) {
   store_result stored = end_job(q, j, end, 1);
-  while (stored == STORE_ERROR && q->shared && shared_pause(q)) { /* the database is away: nothing is lost */
+  for (int lost = 0; q->shared;) {
+    int again = stored == STORE_ERROR  ? shared_pause(q)
+                : stored == STORE_LOST ? made && lost++ < LOST_TRIES && made->published(made->user)
+                                       : 0;
+    if (!again) {
+      break;
+    }
     stored = end_job(q, j, end, 1);
   }
+  return stored;
+}
+
+static void finish_as(queue *q, job *j, job_end *end, const queue_made *made) {
+  store_result stored = end_surely(q, j, end, made);
   if (stored == STORE_CONFLICT && q->shared) {
     log_warn("job %s, attempt %d: this node has lost it; its result is dropped", j->row.id, j->row.attempt);
     queue_give_back(q, j);
@@ -167,12 +181,16 @@ static void finish_as(queue *q, job *j, job_end *end) {
   pthread_mutex_unlock(&q->lock);
 }
 
-void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result) {
-  finish_as(q, j, &(job_end){.state = state, .problem = problem, .result = result});
+void queue_finish(queue *q, job *j, api_job_state state, const char *problem) {
+  finish_as(q, j, &(job_end){.state = state, .problem = problem}, NULL);
+}
+
+void queue_finish_made(queue *q, job *j, const queue_made *made) {
+  finish_as(q, j, &(job_end){.state = API_JOB_SUCCEEDED, .result = made->result}, made);
 }
 
 void queue_finish_mesh(queue *q, job *j, const char *mesh) {
-  finish_as(q, j, &(job_end){.state = API_JOB_SUCCEEDED, .mesh = mesh});
+  finish_as(q, j, &(job_end){.state = API_JOB_SUCCEEDED, .mesh = mesh}, NULL);
 }
 
 /* Takes back queue_show_running(). */

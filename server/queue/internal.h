@@ -43,6 +43,7 @@ struct job {
   int is_guest;     /* see queue.h */
   int64_t memory;   /* taken from the budget; 0: none */
   int needs_all;    /* of the memory that jobs may have */
+  int64_t ready;    /* since when it could be taken, Unix time in ms */
   int64_t retry_at; /* not chosen before this time, orb_clock_ms() */
   orb_context *ctx;
   int64_t last_event, last_event_ms, stored_event_ms;
@@ -119,6 +120,8 @@ job *schedule_choose(queue *q, queue_lane lane); /* the next job for a worker, o
 int schedule_beside(const queue *q, const job *chosen, int64_t now);
 /* Counts a job that a worker of this lane takes. */
 void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now);
+/* The threads of a job that was entered: its part of the cores. beside: the jobs that could run now as well. */
+int schedule_threads(const queue *q, const job *j, int64_t beside);
 int schedule_take_memory(queue *q, queue_lane lane, job *j);
 /* The most triangles of a job for which the lane has memory, −1: none; *big: also for one that needs all. */
 int64_t schedule_room(const queue *q, queue_lane lane, int *big);

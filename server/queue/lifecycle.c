@@ -52,7 +52,6 @@ void queue_destroy(queue *q) {
   if (!q) {
     return;
   }
-  shared_stop(q);
   if (q->timer_started) {
     pthread_mutex_lock(&q->lock);
     q->timer_stop = 1;
@@ -60,6 +59,7 @@ void queue_destroy(queue *q) {
     pthread_mutex_unlock(&q->lock);
     pthread_join(q->timer, NULL);
   }
+  shared_stop(q); /* the timer asks whether jobs are shared */
   for (job *j = q->first, *next; j; j = next) {
     next = j->next;
     job_unref(j);
@@ -79,6 +79,7 @@ static store_result load(queue *q, job_row *row) {
     return STORE_ERROR;
   }
   j->row = *row;
+  j->ready = unix_ms();
   j->refs = 1;
   j->committed = 1;
   /* New events continue after the numbers of the stored ones. */

@@ -17,7 +17,8 @@
  * queue_finish(), queue_give_back() and queue_put_off() in finish.c and queue_wait_for() in dependencies.c set
  * retry_at, before which schedule.c does not choose the job. After the job's process dies, queue_crashed() in finish.c
  * counts the death and queues the job again, until it has died MOST_CRASHES times. With isolate = off the daemon dies,
- * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts. New
+ * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts. Of
+ * several nodes (shared.h), the others do that for one that fell silent: catalogue_recover_lost() in store/jobs.c. New
  * requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
@@ -111,6 +112,7 @@ typedef struct queue_request {
   int64_t
       *room; /* bytes that results of the owner may add; NULL: no limit. Becomes those that its unfinished jobs leave */
   const struct job_webhook *hook; /* that the request names; NULL: none */
+  const char *trace;              /* the span that it belongs to; NULL or "": none */
 } queue_request;
 typedef enum queue_result {
   QUEUE_OK,
@@ -144,6 +146,7 @@ api_job_kind job_kind(const job *j);
 const char *job_result(const job *j); /* the id of the result of a job that has succeeded */
 const char *job_request(const job *j);
 const char *job_charged(const job *j); /* the signing key that its work counts for; "": none */
+const char *job_trace(const job *j);   /* the span of the request; "": none */
 const char *job_owner(const job *j);   /* the tenant that requested it; "" if no token was needed */
 /* Appends the job as JSON; returns its state. */
 api_job_state queue_job_write(queue *q, job *j, api_text *out);
@@ -192,6 +195,10 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const c
                             const int64_t *costs, int count);
 /* The problem of a job that this one waited for and that failed, allocated with malloc(); NULL if none failed. */
 char *queue_dependency_problem(queue *q, job *j);
+/* When a taken job became ready to be taken, Unix time in ms. */
+int64_t queue_ready_ms(queue *q, const job *j);
+/* Which attempt a taken job is in. */
+int queue_attempt(queue *q, const job *j);
 /* Marks a taken job as running, in memory and in the catalogue. Blocks for the commit. */
 store_result queue_claim(queue *q, job *j);
 void queue_set_context(queue *q, job *j, orb_context *ctx);
@@ -199,8 +206,17 @@ int queue_cancel_wanted(queue *q, job *j);
 void queue_progress(queue *q, job *j, const char *stage, double fraction);
 void queue_add_embed_ms(queue *q, job *j, double ms);
 double queue_embed_ms(queue *q, job *j);
-/* Ends a taken job with its result or problem. If the store fails, the job is queued again and retried later. */
-void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result);
+/* Ends a taken job that made nothing, or whose result was there. If the store fails, the job is queued again and
+ * retried later. */
+void queue_finish(queue *q, job *j, api_job_state state, const char *problem);
+/* Ends a taken job that made a result while it held the store of objects. If that hold was lost, published() takes it
+ * again and says whether the objects of the result are still there; if they are not, the job is queued again. */
+typedef struct queue_made {
+  const resource *result;
+  int (*published)(void *user);
+  void *user;
+} queue_made;
+void queue_finish_made(queue *q, job *j, const queue_made *made);
 /* Ends a taken job that fetched a mesh, which is stored. */
 void queue_finish_mesh(queue *q, job *j, const char *mesh);
 /* Returns a taken job that was not claimed; it is retried after a second. For a store that fails. */

@@ -164,6 +164,12 @@ void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now) {
   q->exclusive |= j->row.suspect;
 }
 
+int schedule_threads(const queue *q, const job *j, int64_t beside) {
+  const int64_t others = q->running - q->fetching - !fetches(j), wanted = 1 + others + beside;
+  const int64_t share = wanted < q->options.workers ? wanted : q->options.workers;
+  return j->is_guest || q->options.cores < share ? 1 : q->options.cores / (int)share;
+}
+
 int schedule_beside(const queue *q, const job *chosen, int64_t now) {
   int beside = 0;
   for (const job *other = q->first; other; other = other->next) {
@@ -186,6 +192,7 @@ void schedule_leave(queue *q, job *j) {
   j->taken = 0;
   j->running = 0;
   j->ctx = NULL;
+  j->ready = unix_ms();
   if (q->shared) {
     shared_look(q);
   }
@@ -228,6 +235,20 @@ void queue_set_context(queue *q, job *j, orb_context *ctx) {
     orb_context_cancel(ctx);
   }
   pthread_mutex_unlock(&q->lock);
+}
+
+int64_t queue_ready_ms(queue *q, const job *j) {
+  pthread_mutex_lock(&q->lock);
+  int64_t ready = j->ready;
+  pthread_mutex_unlock(&q->lock);
+  return ready;
+}
+
+int queue_attempt(queue *q, const job *j) {
+  pthread_mutex_lock(&q->lock);
+  int attempt = j->row.attempt;
+  pthread_mutex_unlock(&q->lock);
+  return attempt;
 }
 
 int queue_cancel_wanted(queue *q, job *j) {

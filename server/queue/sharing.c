@@ -1,5 +1,5 @@
-/* A node's thread: it renews the lease, hears what other nodes do, and looks itself each second, because a connection
- * that was lost has lost notices. */
+/* A node's thread: it renews the lease, hears what other nodes do, and polls each second, because notices are lost with
+ * their connection. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -132,7 +132,7 @@ static void *thread_main(void *argument) {
   return NULL;
 }
 
-/* The data folder remembers the name, so that the next process queues again what this one leaves behind at once. Each
+/* The data folder remembers the name, so that the next process at once queues what this one leaves behind. Each
  * process has a new name: a copy of the folder is another node. */
 static int name_node(sharing *s) {
   char path[PATH_MAX];

@@ -76,7 +76,8 @@ job *job_create(queue *q, const queue_request *request) {
   j->row.cost = request->cost;
   j->row.priority = request->priority;
   j->row.listed = request->listed;
-  j->row.created = unix_ms();
+  j->row.created = j->ready = unix_ms();
+  copy_text(j->row.trace, sizeof j->row.trace, request->trace ? request->trace : "");
   api_random_id(j->row.id);
   copy_text(j->row.key, sizeof j->row.key, request->key);
   copy_text(j->row.owner, sizeof j->row.owner, request->owner);
@@ -131,11 +132,8 @@ void job_unref(job *j) {
 
 job *queue_find(queue *q, const char *id) {
   pthread_mutex_lock(&q->lock);
-  job *j = q->by_id[bucket(id)];
-  while (j && (strcmp(j->row.id, id) != 0 || !j->committed)) {
-    j = j->next_id;
-  }
-  if (j && q->shared && !j->taken && !api_job_ended(j->row.state)) {
+  job *j = table_with_id(q, id);
+  if (j && (!j->committed || (q->shared && !j->taken && !api_job_ended(j->row.state)))) {
     j = NULL;
   }
   if (j) {
@@ -177,6 +175,9 @@ const char *job_key(const job *j) {
 }
 api_job_kind job_kind(const job *j) {
   return j->row.kind;
+}
+const char *job_trace(const job *j) {
+  return j->row.trace;
 }
 const char *job_charged(const job *j) {
   return j->row.charged;

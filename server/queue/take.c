@@ -13,11 +13,9 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
   }
   if (j && !q->stopping) {
     int64_t now = orb_clock_ms();
-    int wanted = q->running - q->fetching + 1 + schedule_beside(q, j, now);
-    int share = wanted < q->options.workers ? wanted : q->options.workers;
-    *threads = q->options.cores / share > 0 ? q->options.cores / share : 1;
+    int beside = schedule_beside(q, j, now);
     schedule_enter(q, lane, j, now);
-    *threads = j->is_guest ? 1 : *threads;
+    *threads = schedule_threads(q, j, beside);
     *out = j;
   } else {
     j = NULL;

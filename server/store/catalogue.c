@@ -10,6 +10,7 @@
 #include "log.h"
 #include "store/catalogue.h"
 #include "store/move_mark.h"
+#include "store/object_lock.h"
 #include "store/transactions.h"
 
 enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node, or met it */
@@ -19,7 +20,8 @@ typedef struct pending {
   struct pending *next;
   write_fn fn;
   void *arg;
-  int later; /* of catalogue_write_later(): the writer frees it */
+  int later;      /* of catalogue_write_later(): the writer frees it */
+  int64_t number; /* see object_lock_check() */
   int done, code;
 } pending;
 
@@ -46,6 +48,8 @@ static store_result result_of(int code) {
       return STORE_NOT_FOUND;
     case SQL_FULL:
       return STORE_FULL;
+    case SQL_LOST:
+      return STORE_LOST;
     default:
       return STORE_ERROR;
   }
@@ -70,7 +74,8 @@ static int run_batch(catalogue *cat, pending *batch) {
       code = SQL_IOERR;
       break;
     }
-    p->code = p->fn(db, p->arg);
+    p->code = object_lock_check(db, p->number);
+    p->code = p->code == SQL_OK ? p->fn(db, p->arg) : p->code;
     if (p->code != SQL_OK) {
       database_execute(db, "ROLLBACK TO one");
     }
@@ -137,8 +142,8 @@ static void enqueue(catalogue *cat, pending *p) {
   pthread_cond_signal(&cat->wake);
 }
 
-store_result catalogue_write(catalogue *cat, write_fn fn, void *arg) {
-  pending p = {.fn = fn, .arg = arg};
+static store_result write_and_wait(catalogue *cat, write_fn fn, void *arg, int64_t number) {
+  pending p = {.fn = fn, .arg = arg, .number = number};
   pthread_mutex_lock(&cat->lock);
   enqueue(cat, &p);
   while (!p.done) {
@@ -146,6 +151,14 @@ store_result catalogue_write(catalogue *cat, write_fn fn, void *arg) {
   }
   pthread_mutex_unlock(&cat->lock);
   return result_of(p.code);
+}
+
+store_result catalogue_write(catalogue *cat, write_fn fn, void *arg) {
+  return write_and_wait(cat, fn, arg, 0);
+}
+
+store_result catalogue_write_held(catalogue *cat, write_fn fn, void *arg) {
+  return write_and_wait(cat, fn, arg, object_lock_number());
 }
 
 void catalogue_write_later(catalogue *cat, write_fn fn, void *arg) {

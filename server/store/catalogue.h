@@ -30,6 +30,7 @@
 #include "api/ids.h"
 #include "api/job_codec.h"
 #include "store/objects.h"
+#include "trace/trace.h"
 
 typedef struct catalogue catalogue;
 
@@ -133,6 +134,7 @@ typedef struct job_row {
   int priority;
   int64_t cost;             /* triangles */
   char owner[64];           /* the tenant that requested it */
+  char trace[TRACE_PARENT]; /* the span of the request; "": none */
   char charged[64];         /* the signing key that its work counts for; "": none */
   char result[API_ID_SIZE]; /* of a mesh from a URL that is stored; "": the key is the id of the result */
   char *request, *problem;

@@ -146,6 +146,8 @@ static const char *const migrations[] = {
     " UPDATE tenant SET derived=derived+NEW.derived-OLD.derived WHERE name=NEW.tenant; END;"
     "CREATE TRIGGER resource_grown AFTER UPDATE OF bytes ON resource WHEN NEW.kind IN (1, 2, 4) BEGIN"
     " UPDATE owner SET derived=NEW.bytes WHERE kind=NEW.kind AND id=NEW.id; END;",
+    /* The span that a job belongs to. */
+    "ALTER TABLE job ADD COLUMN trace TEXT NOT NULL DEFAULT '';",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

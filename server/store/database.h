@@ -35,9 +35,6 @@ int database_migrate(database *db);
 static inline int64_t sql_changes(const database *db) {
   return db->connection.driver->changes(&db->connection);
 }
-static inline int64_t sql_last_row(const database *db) {
-  return db->connection.driver->last_row(&db->connection);
-}
 static inline int sql_in_transaction(const database *db) {
   return db->connection.driver->in_transaction(&db->connection);
 }

@@ -15,18 +15,11 @@ void job_row_free(job_row *row) {
   row->request = row->problem = NULL;
 }
 
-typedef struct insert_arg {
-  job_row *row;
-  const job_webhook *hook;
-} insert_arg;
-
-static int insert(database *db, void *arg) {
-  job_row *r = ((insert_arg *)arg)->row;
-  const job_webhook *hook = ((insert_arg *)arg)->hook;
+static int insert_row(database *db, job_row *r) {
   sql_statement *st = database_statement(
       db,
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
-      " charged) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10)");
+      " charged, trace) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) RETURNING seq");
   if (!st) {
     return SQL_ERROR;
   }
@@ -40,11 +33,31 @@ static int insert(database *db, void *arg) {
   sql_bind_text(st, 8, r->request);
   sql_bind_integer(st, 9, r->created);
   sql_bind_text(st, 10, r->charged);
+  sql_bind_text(st, 11, r->trace);
+  int code = sql_step(st);
+  r->seq = code == SQL_ROW ? sql_integer(st, 0) : 0;
+  if (code != SQL_ROW) {
+    log_error("catalogue: %s", db->connection.driver->message(&db->connection));
+  }
+  sql_reset(st);
+  return code == SQL_ROW ? SQL_OK : code;
+}
+
+int job_insert(database *db, job_row *r, const job_webhook *hook) {
   int code = crash_check(db, r->key);
-  code = code == SQL_OK ? database_run(db, st) : code;
-  r->seq = code == SQL_OK ? sql_last_row(db) : 0;
+  code = code == SQL_OK ? insert_row(db, r) : code;
   code = code == SQL_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
   return code == SQL_OK && hook ? delivery_subscribe(db, r->id, hook) : code;
+}
+
+typedef struct insert_arg {
+  job_row *row;
+  const job_webhook *hook;
+} insert_arg;
+
+static int insert(database *db, void *arg) {
+  const insert_arg *a = arg;
+  return job_insert(db, a->row, a->hook);
 }
 
 store_result catalogue_job_insert(catalogue *cat, job_row *row, const job_webhook *hook) {
@@ -183,7 +196,7 @@ static int finish(database *db, void *arg) {
 
 store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, const job_end *end) {
   change c = {.id = id, .attempt = attempt, .end = end};
-  return catalogue_write(cat, finish, &c);
+  return end->result ? catalogue_write_held(cat, finish, &c) : catalogue_write(cat, finish, &c);
 }
 
 static int read_row(sql_statement *st, void *to) {
@@ -209,6 +222,7 @@ static int read_row(sql_statement *st, void *to) {
   out->finished = sql_integer(st, 17);
   row_text(st, 18, out->charged, sizeof out->charged);
   row_text(st, 19, out->result, sizeof out->result);
+  row_text(st, 20, out->trace, sizeof out->trace);
   return out->request != NULL && !row_lacks(st, 14, out->problem);
 }
 static void release_row(void *row) {

@@ -183,7 +183,7 @@ static store_result match_rows(move *m) {
   if (version > 0 && !m->marked) {
     char mark[PLACE_MARK] = "";
     int same = mark_of(&m->target, mark) == STORE_OK && strcmp(mark, m->mark) == 0;
-    return refuse(same ? "the target has a whole copy of this deployment already, of now or of earlier"
+    return refuse(same ? "the target has a whole copy of this deployment already, perhaps an earlier one"
                        : "the catalogue of the target belongs to another deployment");
   }
   return !m->marked && place_has_files(m->to.data) ? refuse("the data folder of the target has objects of its own")

@@ -3,7 +3,7 @@
  *
  * Until the end, no daemon starts on the target: its catalogue has the mark of store/move_mark.h, its bucket an owner
  * that begins with PLACE_MIGRATING. Both name the source, so that a move that was killed goes on, and a target that
- * holds anything else is refused before anything is written. The source is only read, but for its schema, which is
+ * holds anything else is refused before anything is written. The source is only read, except that its schema is
  * brought up to date. */
 #ifndef ORB_STORE_MOVE_H
 #define ORB_STORE_MOVE_H
@@ -28,8 +28,8 @@ typedef struct move_listener {
 
 /* Whether an earlier move of the same deployment has begun here. */
 int move_goes_on(const move *m);
-/* Copies all, and takes the mark away. STORE_CONFLICT: counts->wrong objects of the source are damaged or missing; all
- * else is copied, and the mark stays. */
+/* Copies all, and removes the mark. STORE_CONFLICT: counts->wrong objects of the source are damaged or missing; all
+ * others are copied, and the mark stays. */
 store_result move_run(move *m, const move_listener *listener, object_counts *counts);
 
 #endif

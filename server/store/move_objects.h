@@ -20,7 +20,7 @@ typedef struct object_counts {
   int64_t bytes;         /* copied now */
   int64_t wrong;         /* damaged or missing in the source */
   int64_t left_out;      /* the same, of alignments: the daemon computes them again */
-  int64_t removed;       /* that no row names, from `to` */
+  int64_t removed;       /* deleted from `to`, because no row names them */
 } object_counts;
 
 typedef struct object_move {

@@ -1,17 +1,19 @@
 #include "store/object_lock.h"
 
 #include <pthread.h>
+#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
-
-#include "store/database.h"
 
 struct object_lock {
   pthread_mutex_t lock;
   database db;
   int sharing; /* threads; the first takes the lock of the database, the last gives it back */
   int shared;  /* it was taken for them */
+  int64_t number;
 };
+
+static _Thread_local int64_t number_of_thread;
 
 object_lock *object_lock_open(const char *url) {
   object_lock *l = calloc(1, sizeof *l);
@@ -34,10 +36,13 @@ void object_lock_close(object_lock *l) {
   }
 }
 
-static int run(object_lock *l, const char *function) {
-  char sql[96];
-  snprintf(sql, sizeof sql, "SELECT pg_advisory_%s(%d, hashtext(current_schema()))", function, SQL_LOCK_OBJECTS);
+static int run(object_lock *l, const char *sql) {
   return database_execute(&l->db, sql) == SQL_OK;
+}
+
+/* All locks of the connection are this one and its number. It may be a new connection, which has none. */
+static void let_all_go(object_lock *l) {
+  run(l, "SELECT pg_advisory_unlock_all()");
 }
 
 /* A connection that was made again has no locks. */
@@ -49,10 +54,27 @@ int object_lock_holds(object_lock *l) {
   return holds;
 }
 
+/* Every sharing that begins has another number, also one that did not get the lock: nobody holds that number. */
+static int begin_sharing(object_lock *l) {
+  char sql[192];
+  uint64_t random;
+  randombytes_buf(&random, sizeof random);
+  l->number = (int64_t)(random >> 1) | 1;
+  snprintf(sql, sizeof sql,
+           "SELECT pg_advisory_lock_shared(%d, hashtext(current_schema())); SELECT pg_advisory_lock(%lld)",
+           SQL_LOCK_OBJECTS, (long long)l->number);
+  int taken = run(l, sql);
+  if (!taken) {
+    let_all_go(l);
+  }
+  return taken;
+}
+
 int object_lock_share(object_lock *l) {
   pthread_mutex_lock(&l->lock);
   l->shared = l->sharing++ > 0 && l->shared && object_lock_holds(l);
-  l->shared = l->shared || run(l, "lock_shared");
+  l->shared = l->shared || begin_sharing(l);
+  number_of_thread = l->number;
   int shared = l->shared;
   pthread_mutex_unlock(&l->lock);
   return shared;
@@ -60,16 +82,47 @@ int object_lock_share(object_lock *l) {
 
 void object_lock_unshare(object_lock *l) {
   pthread_mutex_lock(&l->lock);
+  number_of_thread = 0;
   if (--l->sharing == 0 && l->shared) {
-    run(l, "unlock_shared");
+    let_all_go(l);
   }
   pthread_mutex_unlock(&l->lock);
 }
 
+int64_t object_lock_number(void) {
+  return number_of_thread;
+}
+
+/* Who takes the number knows that its connection is gone. */
+int object_lock_check(database *db, int64_t number) {
+  if (!number) {
+    return SQL_OK;
+  }
+  sql_statement *st = database_statement(db, "SELECT pg_try_advisory_xact_lock(?1)::int");
+  if (!st) {
+    return SQL_ERROR;
+  }
+  sql_bind_integer(st, 1, number);
+  int code = sql_step(st);
+  code = code == SQL_ROW ? (sql_integer(st, 0) ? SQL_LOST : SQL_OK) : code == SQL_DONE ? SQL_ERROR : code;
+  sql_reset(st);
+  return code;
+}
+
+/* The second lock is that of transactions (catalogue.c): one that looked before this lock was free ends first. */
 int object_lock_exclude(object_lock *l) {
-  return run(l, "lock");
+  char sql[192];
+  snprintf(sql, sizeof sql,
+           "SELECT pg_advisory_lock(%d, hashtext(current_schema()));"
+           "SELECT pg_advisory_xact_lock(%d, hashtext(current_schema()))",
+           SQL_LOCK_OBJECTS, SQL_LOCK_WRITES);
+  int taken = run(l, sql);
+  if (!taken) {
+    let_all_go(l);
+  }
+  return taken;
 }
 
 void object_lock_let_go(object_lock *l) {
-  run(l, "unlock");
+  let_all_go(l);
 }

@@ -1,15 +1,29 @@
 /* The lock of objects over all nodes that share a bucket: an advisory lock of PostgreSQL, on a connection of its own.
- * Within the node, the lock of objects.c comes first. */
+ * Within the node, the lock of objects.c comes first.
+ *
+ * The database drops the lock with its connection, and others may then delete what was published meanwhile. So who
+ * shares the lock also holds a number, a lock of the same connection that nobody else takes, and a transaction that
+ * names objects commits only while that number is held (object_lock_check()). Who excludes others waits for the
+ * transaction that runs, because it may have looked before the lock was lost. */
 #ifndef ORB_STORE_OBJECT_LOCK_H
 #define ORB_STORE_OBJECT_LOCK_H
+
+#include "store/database.h"
 
 typedef struct object_lock object_lock;
 
 object_lock *object_lock_open(const char *url); /* NULL: it cannot be opened */
 void object_lock_close(object_lock *l);         /* NULL: nothing */
-/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is away. */
+/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is away; to be
+ * given back nevertheless. */
 int object_lock_share(object_lock *l);
 void object_lock_unshare(object_lock *l);
+/* The number that this thread's sharing began with; 0: this thread shares no lock. */
+int64_t object_lock_number(void);
+/* Within a transaction, on the connection that writes: SQL_OK if the lock has been held without a gap since a thread
+ * began to share it with this number (0: SQL_OK), and nobody deletes before the end of the transaction. SQL_LOST: it
+ * has not. */
+int object_lock_check(database *db, int64_t number);
 /* 0: not taken, because others hold it for long, or the database is away. */
 int object_lock_exclude(object_lock *l);
 void object_lock_let_go(object_lock *l);

@@ -1,6 +1,5 @@
 #include "store/objects.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -20,11 +19,9 @@
 #include "log.h"
 #include "metrics.h"
 #include "store/marks.h"
+#include "store/object_files.h"
 #include "store/object_lock.h"
 #include "store/vault.h"
-
-static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset",   "places",
-                                                  "spheres", "quantized", "meshopt", "alignment"};
 
 /* An object whose file is to be deleted when no backup runs. */
 typedef struct held_object {
@@ -49,23 +46,18 @@ struct objects {
   void *heal_user;
 };
 
-static store_result failed(const char *what, const char *path) {
-  int code = errno;
-  log_error("%s %s: %s", what, path, strerror(code));
-  return code == ENOSPC || code == EDQUOT || code == EFBIG ? STORE_FULL : STORE_ERROR;
-}
-
 _Static_assert((int)OBJECT_NAME == (int)VAULT_NAME, "a name of an object is one of the vault");
 
 void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]) {
-  snprintf(out, OBJECT_NAME, "%s/%.2s/%.80s", folders[kind], id, id);
+  snprintf(out, OBJECT_NAME, "%s/%.2s/%.80s", object_folder(kind), id, id);
 }
 
 int objects_read_name(const char *name, object_kind *kind, const char **id) {
   size_t folder = strcspn(name, "/");
   const char *slash = strrchr(name, '/');
   for (int k = 0; slash && k < OBJECT_KINDS; k++) {
-    if (strlen(folders[k]) == folder && strncmp(folders[k], name, folder) == 0) {
+    const char *known = object_folder((object_kind)k);
+    if (strlen(known) == folder && strncmp(known, name, folder) == 0) {
       *kind = (object_kind)k;
       *id = slash + 1;
       return strlen(*id) == API_ID_SIZE - 1 && (*id)[strspn(*id, "0123456789abcdef")] == 0;
@@ -74,70 +66,12 @@ int objects_read_name(const char *name, object_kind *kind, const char **id) {
   return 0;
 }
 
-void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]) {
-  snprintf(out, PATH_MAX, "%s/objects/%s/%.2s/%s", store->root, folders[kind], id, id);
-}
-
-static store_result sync_folder(const char *path) {
-  int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) {
-    return failed("open", path);
-  }
-  int result = fsync(fd);
-  store_result status = result == 0 ? STORE_OK : failed("fsync", path);
-  close(fd);
-  return status;
-}
-
-static store_result make_folder(const char *path) {
-  return mkdir(path, 0700) == 0 || errno == EEXIST ? STORE_OK : failed("mkdir", path);
-}
-
-static void sweep(const char *folder) {
-  DIR *dir = opendir(folder);
-  if (!dir) {
-    return;
-  }
-  int swept = 0;
-  for (struct dirent *entry; (entry = readdir(dir));) {
-    if (entry->d_name[0] != '.') {
-      swept += unlinkat(dirfd(dir), entry->d_name, 0) == 0;
-    }
-  }
-  closedir(dir);
-  if (swept) {
-    log_info("deleted %d temporary files", swept);
-  }
-}
-
-/* The folders of objects of one kind are made with their first object: 256 a kind would take most of a first start. */
 store_result objects_make_folder(const objects *store, object_kind kind, const char *id) {
-  char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/objects/%s/%.2s", store->root, folders[kind], id);
-  store_result status = make_folder(path);
-  *strrchr(path, '/') = 0;
-  return status == STORE_OK ? sync_folder(path) : status; /* another thread may have made it and not synced it yet */
+  return object_file_make_folder(store->root, kind, id);
 }
 
-static store_result make_top(const objects *store) {
-  char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/tmp", store->root);
-  store_result status = make_folder(store->root);
-  return status == STORE_OK ? make_folder(path) : status;
-}
-
-static store_result make_folders(const objects *store) {
-  char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/objects", store->root);
-  store_result status = make_top(store);
-  status = status == STORE_OK ? make_folder(path) : status;
-  for (int kind = 0; kind < OBJECT_KINDS && status == STORE_OK; kind++) {
-    snprintf(path, sizeof path, "%s/objects/%s", store->root, folders[kind]);
-    status = make_folder(path);
-  }
-  snprintf(path, sizeof path, "%s/objects", store->root);
-  status = status == STORE_OK ? sync_folder(path) : status;
-  return status == STORE_OK ? sync_folder(store->root) : status;
+void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]) {
+  object_file_path(store->root, kind, id, out);
 }
 
 /* A store without files of its own so far; data NULL: it will have none. NULL: out of memory, or the path is too long.
@@ -165,20 +99,14 @@ int objects_backup_lock(const char *data) {
   snprintf(path, sizeof path, "%s/backup.lock", data);
   int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (fd < 0) {
-    failed("open", path);
+    file_failed("open", path);
   }
   return fd;
 }
 
-static void sweep_temporary(const objects *store) {
-  char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/tmp", store->root);
-  sweep(path);
-}
-
 store_result objects_open(const char *data, objects **out) {
   objects *store = create(data);
-  store_result status = store ? make_folders(store) : STORE_ERROR;
+  store_result status = store ? object_files_make(store->root) : STORE_ERROR;
   if (status == STORE_OK && (store->backup_lock = objects_backup_lock(data)) < 0) {
     status = STORE_ERROR;
   }
@@ -186,14 +114,14 @@ store_result objects_open(const char *data, objects **out) {
     objects_close(store);
     return status;
   }
-  sweep_temporary(store);
+  object_files_sweep(store->root);
   *out = store;
   return STORE_OK;
 }
 
 store_result objects_open_bucket(const char *data, object_bucket *b, uint64_t most, objects **out) {
   objects *store = create(data);
-  store_result status = store ? make_top(store) : STORE_ERROR;
+  store_result status = store ? object_files_make_top(store->root) : STORE_ERROR;
   if (status == STORE_OK && !(store->vault = vault_open(data, b, most))) {
     status = STORE_ERROR;
   }
@@ -202,7 +130,7 @@ store_result objects_open_bucket(const char *data, object_bucket *b, uint64_t mo
     objects_close(store);
     return status;
   }
-  sweep_temporary(store);
+  object_files_sweep(store->root);
   *out = store;
   return STORE_OK;
 }
@@ -245,8 +173,7 @@ void objects_share(objects *store, object_lock *lock) {
   store->nodes = lock;
 }
 
-/* Without the database no row is committed, so nothing is lost if the lock cannot be taken: a job that publishes
- * ends only when the database is back, and nobody deletes an object that no row has named. */
+/* If the lock cannot be taken, because the database is away, the commit of the row will fail: object_lock_check(). */
 void objects_hold(objects *store) {
   pthread_rwlock_rdlock(&store->publishing);
   if (store->nodes) {
@@ -265,8 +192,14 @@ void objects_let_go(objects *store) {
   } else if (store->nodes && store->excluded) {
     object_lock_let_go(store->nodes);
   }
-  store->excludes = 0; /* set only while one thread has the lock alone */
+  if (store->excludes) { /* only of a thread that has the lock alone; others must not write it */
+    store->excludes = 0;
+  }
   pthread_rwlock_unlock(&store->publishing);
+}
+void objects_hold_again(objects *store) {
+  objects_let_go(store);
+  objects_hold(store);
 }
 int objects_still_excludes(objects *store) {
   return store->excluded && (!store->nodes || object_lock_holds(store->nodes));
@@ -276,14 +209,14 @@ store_result objects_begin(objects *store, object_temp *temp) {
   char path[PATH_MAX];
   if (store->remote.publish) {
     *temp = (object_temp){.fd = memfd_create("object", MFD_CLOEXEC), .store = store};
-    return temp->fd >= 0 ? STORE_OK : failed("create", "an object in memory");
+    return temp->fd >= 0 ? STORE_OK : file_failed("create", "an object in memory");
   }
   snprintf(path, sizeof path, "%s/tmp/put-XXXXXX", store->root);
   temp->fd = mkostemp(path, O_CLOEXEC);
   temp->store = store;
   snprintf(temp->name, sizeof temp->name, "%s", strrchr(path, '/') + 1);
   FAULT_POINT("temp-begun");
-  return temp->fd >= 0 ? STORE_OK : failed("create", path);
+  return temp->fd >= 0 ? STORE_OK : file_failed("create", path);
 }
 
 store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
@@ -294,7 +227,7 @@ store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
       continue;
     }
     if (n <= 0) {
-      return failed("write", temp->name);
+      return file_failed("write", temp->name);
     }
     at += n;
     size -= (size_t)n;
@@ -322,48 +255,19 @@ void objects_abandon(object_temp *temp) {
 }
 
 store_result objects_publish(objects *store, object_temp *temp, object_kind kind, const char *id) {
-  char path[PATH_MAX], from[PATH_MAX];
+  char from[PATH_MAX], name[OBJECT_NAME];
   if (store->remote.publish) {
     store_result status = store->remote.publish(store->remote.user, kind, id, temp->fd);
     objects_abandon(temp);
     return status;
   }
-  if (store->vault) {
-    char name[OBJECT_NAME];
-    objects_name(kind, id, name);
-    temp_path(temp, from);
-    store_result status = vault_publish(store->vault, name, temp->fd, from);
-    close(temp->fd);
-    temp->fd = -1;
-    return status;
-  }
-  objects_path(store, kind, id, path);
-  FAULT_POINT("publish-written");
-  if (fsync(temp->fd) != 0) {
-    store_result status = failed("fsync", temp->name);
-    objects_abandon(temp);
-    return status;
-  }
-  FAULT_POINT("publish-synced");
   temp_path(temp, from);
-  store_result status = STORE_OK;
-  int renamed = rename(from, path) == 0;
-  if (!renamed && errno == ENOENT && (status = objects_make_folder(store, kind, id)) == STORE_OK) {
-    FAULT_POINT("publish-folder");
-    renamed = rename(from, path) == 0;
-  }
-  if (!renamed) {
-    status = status == STORE_OK ? failed("rename to", path) : status;
-    objects_abandon(temp);
-    return status;
-  }
+  objects_name(kind, id, name);
+  store_result status = store->vault ? vault_publish(store->vault, name, temp->fd, from)
+                                     : object_file_publish(store->root, kind, id, temp->fd, from);
   close(temp->fd);
   temp->fd = -1;
-  FAULT_POINT("publish-renamed");
-  *strrchr(path, '/') = 0;
-  store_result synced = sync_folder(path);
-  FAULT_POINT("publish-done");
-  return synced;
+  return status;
 }
 
 store_result objects_put(objects *store, object_kind kind, const char *id, const void *bytes, size_t size) {
@@ -380,8 +284,6 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
 }
 
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size) {
-  char path[PATH_MAX];
-  struct stat info;
   if (store->remote.read) {
     return store->remote.read(store->remote.user, kind, id, fd, size);
   }
@@ -390,29 +292,16 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
     objects_name(kind, id, name);
     return vault_read(store->vault, name, fd, size);
   }
-  objects_path(store, kind, id, path);
-  *fd = open(path, O_RDONLY | O_CLOEXEC);
-  if (*fd < 0) {
-    return errno == ENOENT ? STORE_NOT_FOUND : failed("open", path);
-  }
-  if (fstat(*fd, &info) != 0) {
-    store_result status = failed("stat", path);
-    close(*fd);
-    return status;
-  }
-  *size = (uint64_t)info.st_size;
-  return STORE_OK;
+  return object_file_read(store->root, kind, id, fd, size);
 }
 
 store_result objects_look(const objects *store, object_kind kind, const char *id) {
-  char path[PATH_MAX];
   if (store->vault) {
     char name[OBJECT_NAME];
     objects_name(kind, id, name);
     return vault_look(store->vault, name);
   }
-  objects_path(store, kind, id, path);
-  return access(path, F_OK) == 0 ? STORE_OK : errno == ENOENT ? STORE_NOT_FOUND : failed("look at", path);
+  return object_file_look(store->root, kind, id);
 }
 
 int objects_is_near(const objects *store, object_kind kind, const char *id) {
@@ -477,15 +366,12 @@ static void end_deleting(const objects *store) {
 }
 
 static store_result unlink_object(const objects *store, object_kind kind, const char *id) {
-  char path[PATH_MAX];
   if (store->vault) {
     char name[OBJECT_NAME];
     objects_name(kind, id, name);
     return vault_delete(store->vault, name);
   }
-  objects_path(store, kind, id, path);
-  FAULT_POINT("before-unlink");
-  return unlink(path) == 0 || errno == ENOENT ? STORE_OK : failed("unlink", path);
+  return object_file_delete(store->root, kind, id);
 }
 
 store_result objects_delete(objects *store, object_kind kind, const char *id) {
@@ -581,36 +467,21 @@ int objects_is_marked(const objects *store, object_kind kind, const char *id) {
   return objects_is_near(store, kind, id) && marks_have(store->verified, hash_of(store, kind, id));
 }
 
-/* Moves the file aside if it still has the name: it may have been replaced, or moved by another thread, since it was
- * read. */
-static store_result move_aside(const char *path, const char *aside, int fd, int *moved) {
-  struct stat read, named;
-  if (stat(path, &named) != 0 || fstat(fd, &read) != 0) {
-    return STORE_NOT_FOUND;
-  }
-  if (read.st_ino != named.st_ino) {
-    return STORE_OK;
-  }
-  *moved = rename(path, aside) == 0;
-  return *moved ? STORE_NOT_FOUND : failed("rename to", aside);
-}
-
 void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user) {
   store->heal = heal;
   store->heal_user = user;
 }
 
 store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd) {
-  char path[PATH_MAX], aside[PATH_MAX], fields[160];
+  char aside[PATH_MAX], fields[160];
   if (store->remote.publish) {
     return STORE_NOT_FOUND; /* the daemon does it */
   }
-  objects_path(store, kind, id, path);
   snprintf(aside, sizeof aside, "%s/quarantine", store->root);
-  store_result result = make_folder(aside);
+  store_result result = file_make_folder(aside);
   int moved = 0;
   size_t n = strlen(aside);
-  snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", folders[kind], id, (long long)time(NULL));
+  snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", object_folder(kind), id, (long long)time(NULL));
   if (result == STORE_OK && store->vault) {
     char name[OBJECT_NAME];
     objects_name(kind, id, name);
@@ -618,12 +489,12 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
     moved = result == STORE_NOT_FOUND;
   } else if (result == STORE_OK) {
     (void)objects_exclude(store); /* files: there are no other nodes */
-    result = move_aside(path, aside, fd, &moved);
+    result = object_file_quarantine(store->root, kind, id, fd, aside, &moved);
     objects_let_go(store);
   }
   if (moved) {
     metrics_quarantined();
-    snprintf(fields, sizeof fields, "\"object\":\"%s\",\"id\":\"%s\"", folders[kind], id);
+    snprintf(fields, sizeof fields, "\"object\":\"%s\",\"id\":\"%s\"", object_folder(kind), id);
     log_write(LOG_ERROR, fields, "a stored file does not match its hash and was moved to %s", aside);
     if (store->heal) {
       store->heal(store->heal_user, kind, id);
@@ -633,18 +504,17 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
 }
 
 store_result objects_set_aside(objects *store, object_kind kind, const char *id) {
-  char path[PATH_MAX], aside[PATH_MAX];
-  objects_path(store, kind, id, path);
+  char aside[PATH_MAX];
   snprintf(aside, sizeof aside, "%s/lost+found", store->root);
-  store_result result = make_folder(aside);
+  store_result result = file_make_folder(aside);
   size_t n = strlen(aside);
-  snprintf(aside + n, sizeof aside - n, "/%s-%s", folders[kind], id);
+  snprintf(aside + n, sizeof aside - n, "/%s-%s", object_folder(kind), id);
   if (result == STORE_OK && store->vault) {
     char name[OBJECT_NAME];
     objects_name(kind, id, name);
     result = vault_set_aside(store->vault, name, aside);
-  } else if (result == STORE_OK && rename(path, aside) != 0) {
-    result = failed("rename to", aside);
+  } else if (result == STORE_OK) {
+    result = object_file_set_aside(store->root, kind, id, aside);
   }
   if (result == STORE_OK) {
     utimensat(AT_FDCWD, aside, NULL, 0); /* objects_purge_lost() counts from now */
@@ -653,21 +523,7 @@ store_result objects_set_aside(objects *store, object_kind kind, const char *id)
 }
 
 long objects_purge_lost(objects *store, int64_t before) {
-  char path[PATH_MAX];
-  long purged = 0;
-  snprintf(path, sizeof path, "%s/lost+found", store->root);
-  DIR *dir = opendir(path);
-  for (struct dirent *entry; dir && (entry = readdir(dir));) {
-    struct stat info;
-    if (entry->d_name[0] != '.' && fstatat(dirfd(dir), entry->d_name, &info, AT_SYMLINK_NOFOLLOW) == 0 &&
-        S_ISREG(info.st_mode) && info.st_mtime < before) {
-      purged += unlinkat(dirfd(dir), entry->d_name, 0) == 0;
-    }
-  }
-  if (dir) {
-    closedir(dir);
-  }
-  return purged;
+  return object_files_purge_lost(store->root, before);
 }
 
 int objects_is_read_only(const objects *store) {
@@ -700,27 +556,8 @@ static void visit(void *user, const char *name, uint64_t size) {
 
 store_result objects_each(const objects *store,
                           void (*each)(void *user, object_kind kind, const char *id, uint64_t size), void *user) {
-  store_result result = STORE_OK;
   if (store->vault) {
     return vault_each(store->vault, visit, &(named_visit){each, user});
   }
-  for (int kind = 0; kind < OBJECT_KINDS; kind++) {
-    for (int shard = 0; shard < 256; shard++) {
-      char path[PATH_MAX];
-      snprintf(path, sizeof path, "%s/objects/%s/%02x", store->root, folders[kind], (unsigned)shard);
-      DIR *dir = opendir(path); /* not there: no object in it so far */
-      for (struct dirent *entry; dir && (entry = readdir(dir));) {
-        struct stat info;
-        if (entry->d_name[0] != '.' && fstatat(dirfd(dir), entry->d_name, &info, 0) == 0) {
-          each(user, (object_kind)kind, entry->d_name, (uint64_t)info.st_size);
-        }
-      }
-      if (dir) {
-        closedir(dir);
-      } else if (errno != ENOENT) {
-        result = failed("open", path);
-      }
-    }
-  }
-  return result;
+  return object_files_each(store->root, each, user);
 }

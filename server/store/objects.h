@@ -17,19 +17,8 @@
 #include <stdint.h>
 
 #include "store/bucket.h"
+#include "store/object_files.h"
 #include "store/result.h"
-
-typedef enum object_kind {
-  OBJECT_MESH,
-  OBJECT_SPHERE,
-  OBJECT_ASSET,
-  OBJECT_PLACES,
-  OBJECT_SPHERES,   /* aligned spheres of a supermesh, see store/spheres.h */
-  OBJECT_QUANTIZED, /* profiles of an asset */
-  OBJECT_MESHOPT,
-  OBJECT_ALIGNMENT, /* see store/alignments.h */
-  OBJECT_KINDS
-} object_kind;
 
 typedef struct objects objects;
 
@@ -69,8 +58,10 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
 /* An object without a row is harmless; a row without its object is damage. So a thread that publishes objects and then
  * commits their row calls objects_hold() first; any number of threads may hold at once. A thread that deletes a row and
  * then its objects calls objects_exclude() first, which waits for all holders. The same thread calls objects_let_go()
- * afterwards. */
+ * afterwards. Among nodes, the hold may be lost with a connection: then the commit of the row fails with STORE_LOST. */
 void objects_hold(objects *store);
+/* After STORE_LOST: holds anew. What was published before may have been deleted: objects_look() tells. */
+void objects_hold_again(objects *store);
 /* 0: nodes that share the bucket could not be excluded; nothing may be deleted. */
 int objects_exclude(objects *store);
 void objects_let_go(objects *store);

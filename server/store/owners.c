@@ -157,7 +157,7 @@ static int put(database *db, void *arg) {
 
 store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh) {
   put_arg arg = {.row = r, .tenant = tenant, .quota = quota};
-  store_result result = catalogue_write(cat, put, &arg);
+  store_result result = catalogue_write_held(cat, put, &arg);
   *fresh = result == STORE_OK && arg.fresh;
   return result;
 }
@@ -175,7 +175,7 @@ static int put_alignment(database *db, void *arg) {
 }
 
 store_result catalogue_put_alignment(catalogue *cat, const resource *row, const char *tenant) {
-  return catalogue_write(cat, put_alignment, &(alignment_arg){row, tenant});
+  return catalogue_write_held(cat, put_alignment, &(alignment_arg){row, tenant});
 }
 
 #define COLUMNS \

@@ -295,11 +295,6 @@ static int64_t changes(const sql_connection *c) {
   return ((const connection *)c->native)->changes;
 }
 
-static int64_t last_row(const sql_connection *c) {
-  int64_t row = 0;
-  return run(c->native, "SELECT lastval()", &row) == SQL_OK ? row : 0;
-}
-
 /* The same SQL with parameters as this server numbers them, and how many there are. */
 static char *renumber(const char *sql, int *parameters) {
   char *copy = strdup(sql);
@@ -491,7 +486,6 @@ const sql_driver sql_postgresql = {
     .version = version,
     .hold = hold,
     .changes = changes,
-    .last_row = last_row,
     .prepare = prepare,
     .finish = finish,
     .clear = clear,

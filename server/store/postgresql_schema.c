@@ -204,5 +204,18 @@ const char *const postgresql_migrations[] = {
     " EXECUTE FUNCTION callers_told();"
     "CREATE TRIGGER key_told AFTER INSERT OR DELETE OR UPDATE OF secret, old_secret, old_until, origins, requests,"
     " cpu_seconds ON signing_key FOR EACH STATEMENT EXECUTE FUNCTION callers_told();",
+    /* The span that a job belongs to, and since when it can be claimed. */
+    "ALTER TABLE job ADD COLUMN trace ident NOT NULL DEFAULT '', ADD COLUMN ready BIGINT NOT NULL DEFAULT clock_ms();"
+    "CREATE OR REPLACE FUNCTION job_changes() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"
+    " IF NEW.state<>1 THEN NEW.node:=''; END IF;"
+    " IF NEW.state=0 AND NEW.waits=0 AND (OLD.state<>0 OR OLD.waits<>0) THEN NEW.ready:=clock_ms(); END IF;"
+    " RETURN NEW; END $$;"
+    "DROP TRIGGER job_changes ON job;"
+    "CREATE TRIGGER job_changes BEFORE UPDATE OF state, waits ON job FOR EACH ROW EXECUTE FUNCTION job_changes();"
+    /* An owner's jobs of one kind, in the order of claims; and whether a suspect waits. */
+    "DROP INDEX job_ready;"
+    "CREATE INDEX job_computes ON job(owner, priority DESC, seq) WHERE state=0 AND waits=0 AND kind<>2;"
+    "CREATE INDEX job_fetches ON job(owner, priority DESC, seq) WHERE state=0 AND waits=0 AND kind=2;"
+    "CREATE INDEX job_suspects ON job(seq) WHERE state=0 AND waits=0 AND suspect=1;",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];

@@ -192,7 +192,7 @@ static int add_profile(database *db, void *arg) {
 
 store_result catalogue_add_profile(catalogue *cat, const char *id, int profile, const char *sha, int64_t bytes) {
   profile_arg arg = {.id = id, .sha = sha, .profile = profile, .bytes = bytes};
-  return catalogue_write(cat, add_profile, &arg);
+  return catalogue_write_held(cat, add_profile, &arg);
 }
 
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {

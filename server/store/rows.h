@@ -9,9 +9,10 @@
 #include "store/catalogue.h"
 #include "store/transactions.h"
 
-/* These two run inside a transaction of the writer. */
-int resource_insert(database *db, const resource *r);                  /* keeps an existing row */
-int resource_remove(database *db, resource_kind kind, const char *id); /* SQL_NOTFOUND: no such row */
+/* These run inside a transaction of the writer. */
+int resource_insert(database *db, const resource *r);                       /* keeps an existing row */
+int resource_remove(database *db, resource_kind kind, const char *id);      /* SQL_NOTFOUND: no such row */
+int job_insert(database *db, job_row *row, const struct job_webhook *hook); /* sets row->seq; hook NULL: none */
 
 /* read fills one row and returns 0 if out of memory; release frees a row, also one that was filled in part (NULL: a row
  * owns no memory). */
@@ -30,7 +31,7 @@ typedef struct row_kind {
 #define JOB_COLUMNS_WITH(state)                                                          \
   "seq, id, key, kind, " state                                                           \
   ", attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
-  " created, started, finished, charged, result"
+  " created, started, finished, charged, result, trace"
 extern const row_kind job_rows;
 extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created,
                                       * places, quantized, meshopt */

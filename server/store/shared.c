@@ -2,35 +2,39 @@
 
 #include <stdlib.h>
 
-#include "store/crashes.h"
 #include "store/deliveries.h"
-#include "store/owners.h"
 #include "store/rows.h"
 
 /* Estimate of a job's time, charged until it is known: as queue/schedule.c does within a process. */
 #define ESTIMATE(job) "(10+" job ".cost/100)"
 
 /* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner. Owners with ready jobs, each
- * with its first one, in the order of fairness (queue/queue.h). While a suspect waits, one node keeps its workers. */
-static const char pick[] =
-    "WITH live AS (SELECT name, workers FROM node WHERE until>=clock_ms() AND workers>0),"
-    " busy AS (SELECT owner, count(*) FILTER (WHERE kind<>2) AS computing, count(*) FILTER (WHERE kind=2) AS fetching,"
-    "  coalesce(sum(greatest(0, clock_ms()-claimed-" ESTIMATE("job") ")) FILTER (WHERE kind<>2), 0) AS beyond"
-    "  FROM job WHERE state=1 GROUP BY owner),"
-    " share AS (SELECT ceil((SELECT sum(workers) FROM live)::float/greatest(1, (SELECT count(*) FROM"
-    "  (SELECT owner FROM turn WHERE ready>0 UNION SELECT owner FROM busy WHERE computing>0) AS active))) AS workers)"
-    " SELECT next.id FROM turn t LEFT JOIN busy b ON b.owner=t.owner CROSS JOIN share s CROSS JOIN LATERAL"
-    " (SELECT j.id, j.priority, j.seq, j.suspect FROM job j WHERE j.owner=t.owner AND j.state=0 AND j.waits=0"
-    "  AND (j.kind=2)=(?2=1) AND j.cost<=?3 AND j.big<=?4 AND j.suspect<=?5"
-    "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"
-    "  ORDER BY j.priority DESC, j.seq LIMIT 1) AS next"
-    " WHERE t.ready>0 AND (?6=0 OR (coalesce(b.computing, 0)=0"
-    "   AND (SELECT sum(computing) FROM busy)>=(SELECT sum(workers) FROM live)))"
-    "  AND (?2=0 OR coalesce(b.fetching, 0)<?7)"
-    "  AND (?5=1 OR ?2=1 OR ?6=1 OR ?1<>(SELECT min(name) FROM live)"
-    "   OR NOT EXISTS(SELECT 1 FROM job k WHERE k.state=0 AND k.waits=0 AND k.suspect=1))"
-    " ORDER BY next.suspect DESC, next.priority/8 DESC, (coalesce(b.computing, 0)>=s.workers),"
-    "  t.service+coalesce(b.beyond, 0), next.seq LIMIT 1";
+ * with the first one that fits, in the order of fairness (queue/queue.h). While a suspect waits, one node keeps its
+ * workers. Of an owner it looks at his first LOOK_AT jobs only: a claim that finds none must not read a million. Which
+ * kind is text, so that each has an index of its own. */
+#define LOOK_AT "64"
+#define PICK(of_kind) \
+  "WITH live AS (SELECT name, workers FROM node WHERE until>=clock_ms() AND workers>0),"                              \
+  " busy AS (SELECT owner, count(*) FILTER (WHERE kind<>2) AS computing, count(*) FILTER (WHERE kind=2) AS fetching," \
+  "  coalesce(sum(greatest(0, clock_ms()-claimed-" ESTIMATE("job") ")) FILTER (WHERE kind<>2), 0) AS beyond"          \
+  "  FROM job WHERE state=1 GROUP BY owner),"                                                                         \
+  " share AS (SELECT ceil((SELECT sum(workers) FROM live)::float/greatest(1, (SELECT count(*) FROM"                   \
+  "  (SELECT owner FROM turn WHERE ready>0 UNION SELECT owner FROM busy WHERE computing>0) AS active))) AS workers)"  \
+  " SELECT next.id FROM turn t LEFT JOIN busy b ON b.owner=t.owner CROSS JOIN share s CROSS JOIN LATERAL"             \
+  " (SELECT j.id, j.priority, j.seq, j.suspect FROM"                                                                  \
+  "  (SELECT id, key, priority, seq, suspect, cost, big FROM job WHERE owner=t.owner AND state=0 AND waits=0 AND "    \
+  of_kind "   ORDER BY priority DESC, seq LIMIT " LOOK_AT ") AS j"                                                    \
+  "  WHERE j.cost<=?3 AND j.big<=?4 AND j.suspect<=?5"                                                                \
+  "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"                                             \
+  "  ORDER BY j.priority DESC, j.seq LIMIT 1) AS next"                                                                \
+  " WHERE t.ready>0 AND (?6=0 OR (coalesce(b.computing, 0)=0"                                                         \
+  "   AND (SELECT sum(computing) FROM busy)>=(SELECT sum(workers) FROM live)))"                                       \
+  "  AND (?2=0 OR coalesce(b.fetching, 0)<?7)"                                                                        \
+  "  AND (?5=1 OR ?2=1 OR ?6=1 OR ?1<>(SELECT min(name) FROM live)"                                                   \
+  "   OR NOT EXISTS(SELECT 1 FROM job k WHERE k.state=0 AND k.waits=0 AND k.suspect=1))"                              \
+  " ORDER BY next.suspect DESC, next.priority/8 DESC, (coalesce(b.computing, 0)>=s.workers),"                         \
+  "  t.service+coalesce(b.beyond, 0), next.seq LIMIT 1"
+static const char pick_computing[] = PICK("kind<>2"), pick_fetching[] = PICK("kind=2");
 
 /* Another claim of the same moment skips the row, where the lock of transactions did not keep it waiting. */
 static const char take[] =
@@ -58,7 +62,7 @@ static int step_text(sql_statement *st, char *out, size_t size) {
 }
 
 static int pick_one(database *db, const claim_wish *w, char id[API_JOB_ID_SIZE]) {
-  sql_statement *st = database_statement(db, pick);
+  sql_statement *st = database_statement(db, w->fetches ? pick_fetching : pick_computing);
   if (!st) {
     return SQL_ERROR;
   }
@@ -87,7 +91,7 @@ static int read_claimed(database *db, const char *id, job_claim *out) {
   sql_statement *st =
       database_statement(db, "SELECT " JOB_COLUMNS
                              ", (SELECT coalesce(max(number), 0) FROM event e WHERE e.job=job.id), big, cancel,"
-                             " (SELECT coalesce(sum(ready), 0) FROM turn) FROM job WHERE id=?1");
+                             " (SELECT coalesce(sum(ready), 0) FROM turn), ready FROM job WHERE id=?1");
   if (!st) {
     return SQL_ERROR;
   }
@@ -95,10 +99,11 @@ static int read_claimed(database *db, const char *id, job_claim *out) {
   int code = sql_step(st);
   if (code == SQL_ROW) {
     code = job_rows.read(st, &out->row) ? SQL_OK : SQL_NOMEM;
-    out->last_event = sql_integer(st, 20);
-    out->big = sql_int(st, 21);
-    out->cancel = sql_int(st, 22);
-    out->beside = sql_integer(st, 23);
+    out->last_event = sql_integer(st, 21);
+    out->big = sql_int(st, 22);
+    out->cancel = sql_int(st, 23);
+    out->beside = sql_integer(st, 24);
+    out->ready = sql_integer(st, 25);
   }
   sql_reset(st);
   if (code == SQL_NOMEM) {
@@ -133,30 +138,6 @@ store_result catalogue_claim_next(catalogue *cat, const claim_wish *wish, job_cl
     job_row_free(&out->row);
   }
   return result;
-}
-
-static int insert_job(database *db, job_row *r) {
-  sql_statement *st = database_statement(
-      db,
-      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
-      " charged) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10) RETURNING seq");
-  if (!st) {
-    return SQL_ERROR;
-  }
-  sql_bind_text(st, 1, r->id);
-  sql_bind_text(st, 2, r->key);
-  sql_bind_integer(st, 3, (int)r->kind);
-  sql_bind_integer(st, 4, r->listed);
-  sql_bind_integer(st, 5, r->priority);
-  sql_bind_integer(st, 6, r->cost);
-  sql_bind_text(st, 7, r->owner);
-  sql_bind_text(st, 8, r->request);
-  sql_bind_integer(st, 9, r->created);
-  sql_bind_text(st, 10, r->charged);
-  int code = sql_step(st);
-  r->seq = code == SQL_ROW ? sql_integer(st, 0) : 0;
-  sql_reset(st);
-  return code == SQL_ROW ? SQL_OK : code;
 }
 
 static int find_same(database *db, const char *key, const char *owner, char id[API_JOB_ID_SIZE]) {
@@ -230,13 +211,7 @@ static int submit(database *db, void *arg) {
   }
   memcpy(r->id, a->id, sizeof r->id);
   code = code == SQL_NOTFOUND ? check_limits(db, s) : code;
-  if (code != SQL_OK || s->outcome != SUBMIT_FRESH) {
-    return code;
-  }
-  code = crash_check(db, r->key);
-  code = code == SQL_OK ? insert_job(db, r) : code;
-  code = code == SQL_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
-  return code == SQL_OK && s->hook ? delivery_subscribe(db, r->id, s->hook) : code;
+  return code == SQL_OK && s->outcome == SUBMIT_FRESH ? job_insert(db, r, s->hook) : code;
 }
 
 store_result catalogue_job_submit(catalogue *cat, job_submission *s) {
@@ -255,10 +230,9 @@ static int need_one(database *db, const job_needs *n, int i) {
     memcpy(row.key, n->keys[i], sizeof row.key);
     memcpy(row.owner, n->row->owner, sizeof row.owner);
     memcpy(row.charged, n->row->charged, sizeof row.charged);
+    memcpy(row.trace, n->row->trace, sizeof row.trace);
     row.request = (char *)(uintptr_t)n->requests[i];
-    code = crash_check(db, row.key);
-    code = code == SQL_OK ? insert_job(db, &row) : code;
-    code = code == SQL_OK ? owner_of_meshes(db, row.request, row.owner, row.created, 0) : code;
+    code = job_insert(db, &row, NULL);
   }
   sql_statement *st = code == SQL_OK ? database_statement(db,
                                                           "INSERT INTO need(job, key, owner) VALUES(?1, ?2, ?3)"

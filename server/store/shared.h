@@ -19,15 +19,16 @@ typedef struct claim_wish {
   int fetches;       /* a job that downloads; else one that computes */
   int fetches_most;  /* downloads of an owner at once */
   int64_t most_cost; /* triangles for which this node has memory, and room beside large jobs */
-  int big;           /* a job that needs all memory, too */
-  int alone;         /* a suspect, too: nothing else runs here */
-  int guest;         /* only of an owner who runs nothing, while all workers of all nodes are busy */
+  int big;           /* also a job that needs all memory */
+  int alone;         /* also a suspect: nothing else runs here */
+  int guest;         /* only a job of an owner that runs nothing, while all workers of all nodes are busy */
 } claim_wish;
 typedef struct job_claim {
   job_row row;
   int64_t last_event; /* number */
   int big, cancel;
-  int64_t beside; /* jobs that are ready to run, too */
+  int64_t ready;  /* since when it could be claimed, Unix time in ms of the database's clock */
+  int64_t beside; /* other jobs that are ready to run */
 } job_claim;
 /* Claims the next job. STORE_NOT_FOUND: there is none for this node. */
 store_result catalogue_claim_next(catalogue *cat, const claim_wish *wish, job_claim *out);
@@ -46,7 +47,7 @@ typedef struct job_submission {
  * STORE_FULL. */
 store_result catalogue_job_submit(catalogue *cat, job_submission *s);
 
-/* running → queued until the jobs of these keys have ended, which are inserted where the owner has none.
+/* running → queued, until the jobs of these keys have ended. Inserts those of them that the owner does not have.
  * STORE_CONFLICT: the job is to be cancelled, or this node has lost it. */
 typedef struct job_needs {
   const job_row *row;
@@ -59,7 +60,7 @@ typedef struct job_needs {
 store_result catalogue_job_wait(catalogue *cat, const job_needs *needs);
 /* Like catalogue_job_release(), and the job needs all memory of a node from now on. */
 store_result catalogue_job_release_big(catalogue *cat, const char *id, int attempt);
-/* Marks a job as to be cancelled; who runs it is notified. */
+/* Marks a job as to be cancelled, and notifies the node that runs it. */
 store_result catalogue_job_cancel(catalogue *cat, const char *id);
 
 /* What other nodes did to jobs, for those that this node watches or runs. */
@@ -72,8 +73,8 @@ typedef struct job_mark {
 /* The marks of jobs whose ids are in a text, separated by commas. */
 int catalogue_job_marks(catalogue *cat, const char *ids, int limit, job_mark *out);
 
-/* Whether jobs run on nodes whose lease has passed. A lease does not pass while the database was away, nor within one
- * lease after it came back. */
+/* Whether jobs run on nodes whose lease has passed. No lease passes while the database is away, nor within one
+ * lease after it is back. */
 int catalogue_lost_jobs(catalogue *cat, int64_t lease_ms);
 
 /* Numbers over all nodes. */

@@ -8,6 +8,7 @@ const char *sql_reason(int code) {
       [SQL_ERROR] = "SQL logic error",
       [SQL_CONSTRAINT] = "constraint failed",
       [SQL_NOTFOUND] = "no such row",
+      [SQL_LOST] = "the lock of objects was lost",
       [SQL_NOMEM] = "out of memory",
       [SQL_FULL] = "database or disk is full",
       [SQL_IOERR] = "disk I/O error",

@@ -18,6 +18,7 @@ enum sql_code {
   SQL_ERROR,
   SQL_CONSTRAINT, /* a condition failed: of the schema, or of the caller */
   SQL_NOTFOUND,   /* only callers return it: there is no such row */
+  SQL_LOST,       /* only callers return it: see object_lock_check() */
   SQL_NOMEM,
   SQL_FULL,
   SQL_IOERR,
@@ -59,8 +60,7 @@ typedef struct sql_driver {
   int (*version)(sql_connection *c, int *version); /* of the schema; 0: there is none */
   /* Of the connection that writes, once its schema is up to date. */
   int (*hold)(sql_connection *c);
-  int64_t (*changes)(const sql_connection *c);  /* rows that the last INSERT, UPDATE or DELETE changed */
-  int64_t (*last_row)(const sql_connection *c); /* the sequence number that the last INSERT chose */
+  int64_t (*changes)(const sql_connection *c); /* rows that the last INSERT, UPDATE or DELETE changed */
 
   int (*prepare)(sql_connection *c, const char *sql, sql_statement *out);
   void (*finish)(sql_statement *st); /* before the connection is closed */

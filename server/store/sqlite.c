@@ -81,10 +81,6 @@ static int64_t changes(const sql_connection *c) {
   return sqlite3_changes(c->native);
 }
 
-static int64_t last_row(const sql_connection *c) {
-  return sqlite3_last_insert_rowid(c->native);
-}
-
 static int prepare(sql_connection *c, const char *sql, sql_statement *out) {
   sqlite3_stmt *st = NULL;
   int code = sqlite3_prepare_v3(c->native, sql, -1, SQLITE_PREPARE_PERSISTENT, &st, NULL);
@@ -160,7 +156,6 @@ const sql_driver sql_sqlite = {
     .version = version,
     .hold = hold,
     .changes = changes,
-    .last_row = last_row,
     .prepare = prepare,
     .finish = finish,
     .clear = clear,

@@ -12,7 +12,11 @@ typedef int (*write_fn)(database *db, void *arg); /* returns an SQL code; SQL_CO
 /* Runs fn in the next transaction and waits for its commit. */
 store_result catalogue_write(struct catalogue *cat, write_fn fn, void *arg);
 
-/* The same without waiting; frees arg with free(). */
+/* The same, for a row that names objects which this thread has published. STORE_LOST: it does not hold the store any
+ * more (objects_hold()), or did not all the time; nothing is written. */
+store_result catalogue_write_held(struct catalogue *cat, write_fn fn, void *arg);
+
+/* The same as catalogue_write() without waiting; frees arg with free(). */
 void catalogue_write_later(struct catalogue *cat, write_fn fn, void *arg);
 
 const char *catalogue_path(const struct catalogue *cat);

@@ -19,6 +19,7 @@
 #include "store/keys.h"
 #include "store/owners.h"
 #include "worker/isolated.h"
+#include "worker/spans.h"
 
 enum { FETCHERS = 8 };
 
@@ -123,7 +124,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
     const orb_error *error = orb_context_error(ctx);
     if (error->status == ORB_E_CANCELLED) {
       if (queue_cancel_wanted(env->q, j)) {
-        queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
+        queue_finish(env->q, j, API_JOB_CANCELLED, NULL);
       } else {
         queue_give_back(env->q, j); /* the service is stopping */
       }
@@ -133,7 +134,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
   }
   api_text text = {0};
   api_problem_write(problem, &text);
-  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data, NULL);
+  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data);
   api_text_free(&text);
 }
 
@@ -165,7 +166,13 @@ static void report(const job *j, int fine, double seconds) {
   log_write(LOG_INFO, fields, "%s job %s", api_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
 }
 
-static void fetch_one(worker_pool *pool, job *j) {
+/* In a word, for its span. */
+static const char *why_failed(orb_context *ctx, const api_problem *problem) {
+  const orb_status status = orb_context_error(ctx)->status;
+  return problem->name ? problem->name : status != ORB_OK ? orb_status_name(status) : "given back";
+}
+
+static void fetch_one(worker_pool *pool, job *j, job_spans *spans) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env = pool->env;
   char mesh[API_ID_SIZE];
@@ -174,6 +181,7 @@ static void fetch_one(worker_pool *pool, job *j) {
   int64_t began = orb_clock_ms();
   env.progress = &progress;
   queue_show_running(env.q, j);
+  spans_run(spans, env.q, j, &progress);
   orb_context *ctx = begin(pool, j, 1, &progress);
   if (!ctx) {
     return;
@@ -182,6 +190,7 @@ static void fetch_one(worker_pool *pool, job *j) {
   queue_set_context(env.q, j, NULL);
   progress_enter(&progress, "");
   report(j, fine, 1e-3 * (double)(orb_clock_ms() - began));
+  spans_end(spans, fine ? NULL : why_failed(ctx, &problem));
   if (!claimed) {
     queue_put_off(env.q, j);
   } else if (fine) {
@@ -230,7 +239,7 @@ static void crashed(const run_env *env, job *j, const isolated_end *end) {
       "this as a bug, with its meshes.",
       MOST_CRASHES, end->why);
   api_problem_write(&problem, &text);
-  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data, NULL);
+  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data);
   api_text_free(&text);
   api_problem_free(&problem);
 }
@@ -244,7 +253,34 @@ static int may_be_store(const run_env *env, int64_t began) {
   return objects_are_away(env->store) || catalogue_was_away(env->cat, began);
 }
 
-static void run_claimed(worker_pool *pool, job *j, int threads) {
+typedef struct made {
+  const run_env *env;
+  const resource *row;
+} made;
+
+static int is_published(void *user) {
+  const made *m = user;
+  named_object named[RESOURCE_OBJECTS];
+  const int count = resource_objects(m->row, named);
+  int there = 1;
+  objects_hold_again(m->env->store);
+  for (int i = 0; i < count && there; i++) {
+    there = objects_look(m->env->store, named[i].kind, m->row->id) == STORE_OK;
+  }
+  return there;
+}
+
+/* row: without JSON, the result existed already. */
+static void finish_made(const run_env *env, job *j, const resource *row) {
+  if (row->json) {
+    made m = {env, row};
+    queue_finish_made(env->q, j, &(queue_made){row, is_published, &m});
+  } else {
+    queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL);
+  }
+}
+
+static void run_claimed(worker_pool *pool, job *j, int threads, job_spans *spans) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env_of_job = pool->env, *env = &env_of_job;
   env_of_job.progress = &progress;
@@ -252,6 +288,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   api_problem problem = {0};
   run_output out = {0};
   int64_t began = orb_clock_ms();
+  spans_run(spans, env->q, j, &progress);
   orb_context *ctx = begin(pool, j, threads, &progress);
   if (!ctx) {
     return;
@@ -269,13 +306,14 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     catalogue_key_use(env->cat, job_charged(j), (int64_t)time(NULL) / 86400, 0, (int64_t)(1e3 * seconds * threads));
   }
   report(j, fine, seconds);
+  spans_end(spans, fine ? NULL : end.died ? "job-crashed" : why_failed(ctx, &problem));
   if (end.died) {
     crashed(env, j, &end);
   } else if (fine) {
     if (embedding) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
     }
-    queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
+    finish_made(env, j, &out.row);
   } else if (out.gone || (may_be_store(env, began) && !queue_cancel_wanted(env->q, j))) {
     queue_give_back(env->q, j); /* a worker plans it again, once the stores are back */
   } else if (!lacks_memory(ctx, &problem) || !queue_needs_memory(env->q, j)) {
@@ -291,8 +329,10 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
 
 static void run_one(worker_pool *pool, job *j, int threads) {
   const run_env *env = &pool->env;
+  job_spans spans;
+  spans_begin(&spans, env->q, j);
   if (queue_cancel_wanted(env->q, j)) {
-    queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
+    queue_finish(env->q, j, API_JOB_CANCELLED, NULL);
     return;
   }
   if (objects_are_away(env->store)) {
@@ -300,24 +340,25 @@ static void run_one(worker_pool *pool, job *j, int threads) {
     return;
   }
   if (job_kind(j) == API_JOB_FETCH) {
-    fetch_one(pool, j);
+    fetch_one(pool, j, &spans);
     return;
   }
   char *reason = queue_dependency_problem(env->q, j);
   if (reason) {
-    queue_finish(env->q, j, API_JOB_FAILED, reason, NULL);
+    queue_finish(env->q, j, API_JOB_FAILED, reason);
     free(reason);
     return;
   }
   int waits = job_kind(j) == API_JOB_SUPERMESH ? plan(env, j) : 0;
   if (waits > 0) {
+    spans_queue(&spans);
     return;
   }
   if (waits < 0 || queue_claim(env->q, j) != STORE_OK) {
     queue_put_off(env->q, j);
     return;
   }
-  run_claimed(pool, j, threads);
+  run_claimed(pool, j, threads, &spans);
 }
 
 static void *worker_main(void *argument) {

@@ -5,6 +5,17 @@
 
 #include "metrics.h"
 
+static void record_stage(const job_progress *progress) {
+  char self[TRACE_PARENT];
+  trace_begin_below(progress->trace, self);
+  trace_end(&(trace_span){.self = self,
+                          .parent = progress->trace,
+                          .name = progress->stage,
+                          .kind = TRACE_INTERNAL,
+                          .start_us = progress->began_us,
+                          .end_us = trace_now_us()});
+}
+
 void progress_enter(job_progress *progress, const char *stage) {
   if (strncmp(progress->stage, stage, sizeof progress->stage - 1) == 0) {
     return;
@@ -12,9 +23,11 @@ void progress_enter(job_progress *progress, const char *stage) {
   double now = orb_clock();
   if (progress->stage[0]) {
     metrics_stage((int)job_kind(progress->j), progress->stage, now - progress->began);
+    record_stage(progress);
   }
   snprintf(progress->stage, sizeof progress->stage, "%s", stage);
   progress->began = now;
+  progress->began_us = trace_now_us();
 }
 
 void progress_report(void *user, const char *stage, double fraction) {

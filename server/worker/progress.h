@@ -3,6 +3,7 @@
 #define ORB_WORKER_PROGRESS_H
 
 #include "queue/queue.h"
+#include "trace/trace.h"
 
 typedef struct job_progress {
   queue *q; /* NULL: show() */
@@ -11,6 +12,8 @@ typedef struct job_progress {
   void *user;
   char stage[24];
   double began;
+  char trace[TRACE_PARENT]; /* the span of the attempt at the job; "": none */
+  int64_t began_us;         /* of the stage, Unix time */
 } job_progress;
 
 /* Ends the time measurement of the current stage and begins the next; "": none. */

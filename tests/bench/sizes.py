@@ -14,12 +14,11 @@ import math
 import os
 import pathlib
 import statistics
-import subprocess
 import sys
 import tempfile
-import time
 
 import surface
+from first_answer import line, measure
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HEAD = """# What a merge costs by the size of its shapes
@@ -113,25 +112,10 @@ def rows(options, folder):
             yield label, marks_file, [made[file, step][1] for file in given]
 
 
-def measure(program, marks, files, threads):
-    arguments = ["--landmarks", marks, "--align-preset", "default"] if marks else ["--align", "auto"]
-    command = [program / "orbmorph-bench", "merge", "--threads", str(threads), *arguments, *files]
-    before, start = os.times(), time.monotonic()
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    wall, after = time.monotonic() - start, os.times()
-    if done.returncode != 0:
-        sys.exit(f"{command}: {done.stderr.strip()}")
-    cpu = after.children_user + after.children_system - before.children_user - before.children_system
-    return cpu, wall, json.loads(done.stdout)
-
-
-def line(cells):
-    return "| " + " | ".join(str(cell) for cell in cells) + " |\n"
-
-
 def figures(program, row, options):
     name, marks, files = row
-    found = [measure(program, marks, files, options.threads) for _ in range(options.repeat)]
+    arguments = ["--landmarks", marks, "--align-preset", "default"] if marks else ["--align", "auto"]
+    found = [measure(program, arguments, files, options.threads) for _ in range(options.repeat)]
     middle = [statistics.median(values) for values in zip(*((cpu, wall) for cpu, wall, _ in found))]
     stages = {k: statistics.median(one["seconds"][k] for *_, one in found)
               for k in ("embed", "align", "remesh", "transfer")}

@@ -21,9 +21,9 @@ int main(int count, char **arguments) {
   } else if (addresses) {
     failed = failed || seccomp_rule_add(rules, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(connect), 0) != 0;
   } else {
-    failed =
-        failed || seccomp_rule_add(rules, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(seccomp), 0) != 0 ||
-        seccomp_rule_add(rules, SCMP_ACT_ERRNO(EINVAL), SCMP_SYS(prctl), 1, SCMP_A0(SCMP_CMP_EQ, PR_SET_SECCOMP)) != 0;
+    failed = failed || seccomp_rule_add(rules, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(seccomp), 0) != 0 ||
+             seccomp_rule_add(rules, SCMP_ACT_ERRNO(EINVAL), SCMP_SYS(prctl), 1,
+                              SCMP_A0(SCMP_CMP_EQ, PR_SET_SECCOMP, 0)) != 0;
   }
   if (failed || seccomp_load(rules) != 0) {
     perror("without");

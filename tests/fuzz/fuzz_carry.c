@@ -43,6 +43,12 @@ static void add(orb_context *ctx, const uint8_t *bytes, size_t size, const orb_m
                                  .joint_count = skin->joint_count,
                                  .joints = joints,
                                  .weights = values};
+    more.skin.surface = (orb_skin_surface){.count = mesh->vertex_count,
+                                           .before = mesh->positions,
+                                           .after = mesh->positions,
+                                           .area = mesh->positions, /* any numbers */
+                                           .joints = (const uint16_t(*)[4])joints,
+                                           .weights = (const float(*)[4])values};
     memcpy(more.skin.place, skin->place, sizeof more.skin.place);
     for (int k = 0; k < 4; k++) {
       more.skin.moved[5 * k] = 1;

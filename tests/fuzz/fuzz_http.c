@@ -51,11 +51,12 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
   log_setup(LOG_ERROR, 1);
   srv.options = &options;
   srv.control = -1;
-  if (!srv.memory || !listen_open(&options, &srv.at) || objects_open(options.data, &srv.store) != STORE_OK ||
-      catalogue_open(options.data, &srv.cat) != STORE_OK || !add_token() || !(srv.callers = callers_open(srv.cat)) ||
-      !(srv.q = queue_create(&queued, srv.cat)) || !(srv.descriptions = cache_create(1 << 20)) ||
-      !(srv.io = tasks_start(1, NULL)) || !(srv.checks = tasks_start(1, srv.memory)) ||
-      !(srv.large_checks = tasks_start(1, srv.memory)) || !http_start(&srv)) {
+  if (!srv.memory || !listen_open(&options, options.listen, &srv.at) ||
+      objects_open(options.data, &srv.store) != STORE_OK || catalogue_open(options.data, &srv.cat) != STORE_OK ||
+      !add_token() || !(srv.callers = callers_open(srv.cat)) || !(srv.q = queue_create(&queued, srv.cat)) ||
+      !(srv.descriptions = cache_create(1 << 20)) || !(srv.io = tasks_start(1, NULL)) ||
+      !(srv.checks = tasks_start(1, srv.memory)) || !(srv.large_checks = tasks_start(1, srv.memory)) ||
+      !http_start(&srv)) {
     abort();
   }
   __atomic_store_n(&srv.ready, 1, __ATOMIC_RELEASE);

@@ -6,6 +6,7 @@
 
 #include "api/mesh_codec.h"
 #include "api/routes.h"
+#include "api/transfer_codec.h"
 #include "http/decode.h"
 #include "http/parse.h"
 
@@ -31,10 +32,39 @@ static char *value_of(char *query, const char *name) {
   return NULL;
 }
 
+/* A list of transfers that is accepted is within its bounds, and its canonical form says the same. */
+static void read_transfer(const char *text) {
+  orb_carry read[ORB_CARRY_MAX], again[ORB_CARRY_MAX];
+  int32_t count = 0, same = 0;
+  api_problem problem = {0};
+  cJSON *list = api_transfer_parse(text);
+  if (list && api_transfer_read(list, 16, read, &count, &problem)) {
+    api_text out = {0};
+    api_transfer_write(read, count, &out);
+    cJSON *written = out.data ? cJSON_Parse(out.data) : NULL;
+    if (!written || !api_transfer_read(written, 16, again, &same, &problem) || same != count) {
+      abort();
+    }
+    for (int32_t i = 0; i < count; i++) {
+      if (read[i].from < 0 || read[i].from > 15 || read[i].from != again[i].from || read[i].what != again[i].what ||
+          read[i].resolution > ORB_BAKE_MOST || read[i].resolution != again[i].resolution) {
+        abort();
+      }
+    }
+    cJSON_Delete(written);
+    api_text_free(&out);
+  } else if (list && !problem.name) {
+    abort();
+  }
+  cJSON_Delete(list);
+  api_problem_free(&problem);
+}
+
 static void read_query(char *query, const char *prefer) {
   char *limit = value_of(query, "limit"), *token = value_of(query, "page_token"), *wait = value_of(query, "wait");
   char *name = value_of(query, "name"), *repair = value_of(query, "repair"), *format = value_of(query, "format");
   char *handle_size = value_of(query, "handle_size"), *part = value_of(query, "part");
+  char *transfer = value_of(query, "transfer");
   int most;
   uint64_t sealed;
   const char *why = NULL;
@@ -60,6 +90,10 @@ static void read_query(char *query, const char *prefer) {
     abort();
   }
   api_problem_free(&problem);
+  if (transfer) {
+    read_transfer(transfer);
+  }
+  free(transfer);
   free(limit);
   free(token);
   free(wait);

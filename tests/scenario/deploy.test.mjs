@@ -9,6 +9,7 @@ import test from 'node:test';
 import parsers from '@stoplight/spectral-parsers';
 import { folder } from './support/cli.mjs';
 import { binaries, daemon, root, slow, until } from './support/daemon.mjs';
+import { configuration } from './support/haproxy.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const lacks = (program) => spawnSync(program, ['--version']).error !== undefined && `${program} is not installed`;
@@ -222,8 +223,18 @@ test('the files for a cluster are valid and name options that the daemon has', (
       name,
     );
   }
-  assert.equal(spec('serve').template.spec.containers[0].readinessProbe.httpGet.path, '/readyz');
-  assert.equal(spec('work').template.spec.containers[0].ports, undefined, 'a worker needs no port');
+  for (const [name, option] of [
+    ['serve', '--listen'],
+    ['work', '--metrics-listen'],
+  ]) {
+    const { annotations } = spec(name).template.metadata;
+    const [{ args, ports, readinessProbe, livenessProbe }] = spec(name).template.spec.containers;
+    assert.equal(readinessProbe.httpGet.path, '/readyz');
+    assert.equal(livenessProbe.httpGet.path, '/livez');
+    for (const probe of [readinessProbe, livenessProbe]) assert.equal(probe.httpGet.port, ports[0].name);
+    assert.equal(args[args.indexOf(option) + 1], `0.0.0.0:${ports[0].containerPort}`);
+    assert.equal(annotations['prometheus.io/port'], `${ports[0].containerPort}`);
+  }
   for (const variable of cluster('compose.yaml').matchAll(/\$\{([A-Z0-9_]+):\?/g))
     assert.match(cluster('example.env'), new RegExp(`^${variable[1]}=`, 'm'));
 });
@@ -238,10 +249,7 @@ test('haproxy takes its configuration, and hides what strangers should not see',
 
   const d = await daemon(t);
   const socket = path.join(await folder(t), 'clients.sock');
-  const text = cluster('haproxy.cfg')
-    .replace(/^ {4}maxconn 16384$/m, '    maxconn 64') // each takes descriptors, of which a test may have few
-    .replace(/^ {4}bind :8080$/m, `    bind unix@${socket}`)
-    .replace(/^ {4}server-template .*$/m, `    server one ${new URL(d.url).host}`);
+  const text = configuration([d.url], `unix@${socket}`);
   const own = path.join(path.dirname(socket), 'haproxy.cfg');
   await writeFile(own, text);
   const proxy = spawn('haproxy', ['-db', '-f', own], { stdio: 'ignore' });

@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
+import { rigged } from '../samples/rigged.mjs';
 import { assertProblem, daemon, endless, samples } from './support/daemon.mjs';
 import { parseGlb } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
@@ -97,6 +98,29 @@ test('every parameter is the member that POST has', async (t) => {
     assert.equal(reply.status, 200, `${query}: ${reply.bytes.subarray(0, 300)}`);
     assert.ok(reply.headers.get('link').includes(wanted.id), query);
   }
+});
+
+test('what other shapes have comes by URL, too', async (t) => {
+  const d = await daemon(t);
+  const egg = (await d.upload(shapes.obj(shapes.egg(2)), { name: 'egg' })).json.id;
+  const body = (await d.upload(rigged().bytes, { name: 'body', repair: 'largest_component' })).json.id;
+  const both = [{ mesh: egg }, { mesh: body }];
+  const request = { shapes: both, remesh: { tolerance: 0.05 }, align: { method: 'rotate' } };
+  const transfer = ['skin', 'targets', 'texcoord'].map((what) => ({ from: 1, what }));
+  const wanted = await d.made('/v1/supermeshes', { ...request, transfer });
+  const url = small(`${egg},${body}`);
+  const reply = await d.get(`${url}&transfer=1:skin,1:targets,1:texcoord`);
+  assert.equal(reply.status, 200, reply.bytes.toString());
+  assert.ok(reply.headers.get('link').includes(wanted.id));
+  const { gltf } = parseGlb(reply.bytes);
+  assert.equal(gltf.skins[0].joints.length, 20);
+  assert.deepEqual(gltf.meshes[0].extras.targetNames, ['body', 'smile']);
+  for (const list of ['', '1', 'skin', '1:', ':skin', '2:skin', '1:bones', '1:skin:64', '1:texture:8', '1:texture:'])
+    assertProblem(await d.get(`${url}&transfer=${list}`), 422, 'invalid-request', list);
+  for (const list of ['1:texture:1e3', '1:texture:64:64', '-1:color', '1:skin,', '1:skin,1:skin', '1:skin,0:skin'])
+    assertProblem(await d.get(`${url}&transfer=${list}`), 422, 'invalid-request', list);
+  const many = Array(65).fill('1:color');
+  assertProblem(await d.get(`${url}&transfer=${many}`), 422, 'invalid-request');
 });
 
 test('an invalid recipe is refused', async (t) => {

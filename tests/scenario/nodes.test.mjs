@@ -10,7 +10,10 @@ import { mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
+import { Collector } from './support/collector.mjs';
 import { assertProblem, Daemon, endless, patience, samples, until } from './support/daemon.mjs';
+import { haproxy, lacksHaproxy } from './support/haproxy.mjs';
+import { busy, half, late, lost, pass, s3Proxy } from './support/s3_proxy.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const program = process.env.ORB_DAEMON; // that starts with a catalogue and objects of its own
@@ -43,7 +46,8 @@ class Cluster {
   constructor(t) {
     const name = `cluster${process.pid}-${++Cluster.count}`;
     this.catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
-    this.objects = `s3://objects/${name}?endpoint=${process.env.ORB_S3}`;
+    this.bucket = `s3://objects/${name}?endpoint=${process.env.ORB_S3}`;
+    this.objects = this.bucket; // as nodes reach it
     t.after(() => this.end());
   }
 
@@ -68,9 +72,8 @@ class Cluster {
   }
 
   sql(text) {
-    const set = `SET search_path=${/search_path%3D(\w+)/.exec(this.catalogue)[1]};`;
-    return execFileSync('psql', ['-X', '-qAt', '-v', 'ON_ERROR_STOP=1', '-d', process.env.ORB_POSTGRESQL], {
-      input: set + text,
+    return execFileSync('psql', ['-X', '-qAt', '-v', 'ON_ERROR_STOP=1', '-d', this.catalogue], {
+      input: text,
       encoding: 'utf8',
     }).trim();
   }
@@ -92,7 +95,7 @@ class Cluster {
   /** Every row has its object, and every object its row, but for what a node that died had just uploaded. */
   async check() {
     const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
-    const args = ['--check-data', '--data', data, '--catalogue', this.catalogue, '--objects', this.objects];
+    const args = ['--check-data', '--data', data, '--catalogue', this.catalogue, '--objects', this.bucket];
     const found = spawnSync(program, args, { encoding: 'utf8', timeout: 120_000 * patience });
     await rm(data, { recursive: true });
     assert.equal(found.status, 0, found.stdout + found.stderr);
@@ -141,16 +144,21 @@ const slowJob = async (node, scale = 1) =>
 
 test('what one node accepts, others run and show', async (t) => {
   const c = new Cluster(t);
-  const a = await c.node('--role', 'serve');
-  const b = await c.node('--role', 'serve');
-  const w = await c.node('--role', 'work');
-  assert.match(w.out, /works without a port/);
+  const traces = await Collector.start(t);
+  const a = await c.node('--role', 'serve', '--traces', traces.url);
+  const b = await c.node('--role', 'serve', '--traces', traces.url);
   const { id } = await a.mesh(path.join(samples, 'dog.obj'));
   assert.equal((await b.get(`/v1/meshes/${id}`)).status, 200);
   const reply = await a.post('/v1/embeddings', { mesh: id });
   assert.equal(reply.status, 202);
   const twice = await b.post('/v1/embeddings', { mesh: id });
-  if (twice.status === 202) assert.equal(twice.json.id, reply.json.id); // one flight a key
+  assert.equal(twice.status, 202);
+  assert.equal(twice.json.id, reply.json.id); // one flight a key
+  const w = await c.node('--role', 'work', '--metrics-listen', '127.0.0.1:0', '--traces', traces.url);
+  for (const health of ['/livez', '/readyz']) assert.equal((await w.get(health)).status, 200);
+  for (const other of ['/v1/meshes', '/', '/openapi.json', '/v1/morph.glb'])
+    assertProblem(await w.get(other), 404, 'not-found', other);
+  assertProblem(await w.post('/v1/embeddings', {}), 404, 'not-found');
   const [here, there] = await Promise.all([a.ended(reply.json), b.ended(reply.json)]);
   assert.equal(here.state, 'succeeded');
   sameEnd(there, here);
@@ -160,7 +168,12 @@ test('what one node accepts, others run and show', async (t) => {
 
   // A supermesh waits for an embedding that it lacks; its events come from any node, and go on where they ended.
   const other = await b.upload(newMesh());
-  const merged = await b.post('/v1/supermeshes', { shapes: [{ mesh: id }, { mesh: other.json.id }] });
+  const trace = '4bf92f3577b34da6a3ce929d0e0e4736';
+  const merged = await b.post(
+    '/v1/supermeshes',
+    { shapes: [{ mesh: id }, { mesh: other.json.id }] },
+    { headers: { traceparent: `00-${trace}-00f067aa0ba902b7-01` } },
+  );
   assert.equal(merged.status, 202, merged.bytes.toString());
   const first = await eventsOf(a, merged.json, 0, (event) => event.type === 'progress');
   const rest = await eventsOf(b, merged.json, first.at(-1).number, () => false);
@@ -172,13 +185,62 @@ test('what one node accepts, others run and show', async (t) => {
     204,
   );
 
+  // Two nodes had part in it, and one trace has both.
+  const of = (span) => span.trace === trace;
+  const names = ['POST /v1/supermeshes', 'embedding job', 'supermesh job'];
+  await until(() => names.every((name) => traces.named(name, of).length > 0), 'the spans of request and jobs');
+  const [asked] = traces.named('POST /v1/supermeshes', of);
+  const [ran] = traces.named('supermesh job', of);
+  assert.equal(ran.parent, asked.id);
+  assert.deepEqual(
+    [asked, ran].map(({ resource }) => resource['orbmorph.role']),
+    ['serve', 'work'],
+  );
+  assert.ok(traces.named('remesh', of).every(({ parent }) => parent === ran.id));
+  assert.equal(traces.named('embedding job', of)[0].parent, asked.id);
+
+  // The node that has done the work counts it, those that serve do not.
+  const done = async (node) =>
+    /^orbmorph_jobs_ended_total\{state="succeeded"\} (\d+)$/m.exec((await node.get('/metrics')).bytes)[1];
+  assert.ok(Number(await done(w)) >= 3);
+  const merges = async (node) =>
+    /^orbmorph_job_seconds_count\{kind="supermesh"\} (\d+)$/m.exec((await node.get('/metrics')).bytes)[1];
+  assert.deepEqual([await merges(a), await merges(b), await merges(w)], ['0', '0', '1']);
+
   // Deleted on one node, it is gone on all.
   const gone = rest.at(-1).job.result;
   assert.equal((await a.get(gone)).status, 200);
   assert.equal((await b.delete(gone)).status, 204);
   await until(async () => (await a.get(gone)).status === 404, 'it is gone', 10);
   assert.match(await c.check(), / 0 wrong, 0 objects without a row/);
+  if (lacksHaproxy) t.diagnostic(lacksHaproxy);
+  else await behindHaproxy(t, [a, b]);
 });
+
+/** Clients of haproxy do not miss a node that is killed. */
+async function behindHaproxy(t, [a, b]) {
+  const p = await haproxy(
+    t,
+    [a, b].map(({ url }) => url),
+  );
+  const asked = [];
+  for (let i = 0; i < 4; i++) asked.push((await p.get('/v1/meshes')).status);
+  assert.deepEqual(asked, [200, 200, 200, 200]);
+  const job = await slowJob(p);
+  const seen = await eventsOf(p, job, 0, () => true);
+  a.killed = true;
+  await a.stop('SIGKILL');
+  const mesh = await p.upload(newMesh());
+  assert.equal(mesh.status, 201);
+  const rest = eventsOf(p, job, seen.at(-1).number, ({ type }) => type === 'cancelled');
+  assert.equal((await p.get(job.url)).json.state, 'running');
+  assert.equal((await p.delete(job.url)).json.state, 'cancelled');
+  const events = await rest;
+  assert.ok(events.every(({ number }) => number > seen.at(-1).number));
+  assert.equal(events.at(-1).type, 'cancelled');
+  const made = await p.made('/v1/embeddings', { mesh: mesh.json.id });
+  assert.equal((await p.get(`/v1/embeddings/${made.id}/sphere.ply`)).status, 200);
+}
 
 test('any node cancels a job; a node that is killed loses its jobs to others', async (t) => {
   const c = new Cluster(t);
@@ -200,13 +262,14 @@ test('any node cancels a job; a node that is killed loses its jobs to others', a
   const again = await until(
     async () => {
       const { json } = await a.get(running.url);
-      return json.state === 'running' && json.attempt > running.attempt && json;
+      return json.state === 'running' && json.attempt !== running.attempt && json;
     },
     'the other node runs it',
     60,
   );
   assert.equal(await c.runner(again), second);
-  assert.equal(c.sql(`SELECT suspect FROM job WHERE id='${again.id}'`), '1');
+  assert.deepEqual([running.attempt, again.attempt], [1, 2]);
+  assert.equal(c.sql(`SELECT suspect, alone, crashes FROM job WHERE id='${again.id}'`), '1|1|0'); // it was not alone
   assert.equal((await b.delete(running.url)).json.state, 'cancelled');
   assert.equal((await a.delete(running.url)).json.state, 'cancelled'); // again, on another node
 });
@@ -215,6 +278,7 @@ test('a node that was paused beyond its lease drops what it made; others have ma
   const c = new Cluster(t);
   const serve = await c.node('--role', 'serve');
   const works = [await c.node('--role', 'work'), await c.node('--role', 'work')];
+  for (const work of works) assert.match(work.out, /works without a port/);
   const ids = [];
   for (const name of ['dog.obj', 'giraffe.off']) ids.push((await serve.mesh(path.join(samples, name))).id);
   for (const mesh of ids) await serve.made('/v1/embeddings', { mesh });
@@ -223,7 +287,8 @@ test('a node that was paused beyond its lease drops what it made; others have ma
   paused.child.kill('SIGSTOP');
   const done = await serve.ended(json);
   assert.equal(done.state, 'succeeded');
-  assert.ok(done.attempt >= 2, `${done.attempt}`);
+  assert.equal(done.attempt, 2);
+  assert.equal(c.sql(`SELECT crashes FROM job WHERE id='${json.id}'`), '0'); // it was not alone on the node that fell silent
   const asset = await serve.get(`${done.result}/asset.glb`);
   assert.equal(asset.status, 200);
   paused.child.kill('SIGCONT');
@@ -261,6 +326,7 @@ test('while PostgreSQL is away, requests get 503 and running jobs lose nothing',
   const done = await a.ended(json);
   assert.equal(done.state, 'succeeded');
   assert.equal(done.attempt, 1);
+  assert.equal(a.log.match(/supermesh job done/g).length, 1); // what it made was not made again
   c.cut();
   assert.equal((await a.upload(newMesh())).status, 201);
   await c.check();
@@ -304,6 +370,8 @@ class Ledger {
 
 test('no chaos loses an accepted job, or changes what it made', async (t) => {
   const c = new Cluster(t);
+  const proxy = await s3Proxy(t, process.env.ORB_S3, () => pass);
+  c.objects = c.bucket.replace(process.env.ORB_S3, proxy.url);
   const serve = [await c.node('--workers', '1'), await c.node('--workers', '1')];
   const work = await c.node('--role', 'work', '--workers', '1');
   const all = [...serve, work];
@@ -332,6 +400,12 @@ test('no chaos loses an accepted job, or changes what it made', async (t) => {
       await sleep(300);
       s3 = Number(execFileSync(process.env.ORB_S3_START, { encoding: 'utf8' }));
       await until(() => fetch(process.env.ORB_S3).catch(() => 0), 'S3 is back', 60);
+    },
+    async answers() {
+      const troubles = [busy, half, lost, late, pass];
+      proxy.decide = () => troubles[random(troubles.length)];
+      await sleep(1000);
+      proxy.decide = () => pass;
     },
   };
   const order = Object.keys(actions);

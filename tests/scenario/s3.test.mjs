@@ -3,13 +3,13 @@
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
-import { mkdir, mkdtemp, readdir, rm } from 'node:fs/promises';
+import { mkdir, mkdtemp, readdir, readFile, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { list, s3 } from '../tools/s3.mjs';
 import { runProgram } from './support/cli.mjs';
-import { assertProblem, Daemon, daemon, samples, until } from './support/daemon.mjs';
+import { assertProblem, Daemon, daemon, root, samples, until } from './support/daemon.mjs';
 import { busy, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
 import { tetrahedron } from './support/shapes.mjs';
 
@@ -199,6 +199,19 @@ test('while S3 is away, requests get 503, the cache is served and jobs wait', as
   await until(async () => (await d.get(`/v1/jobs/${job.json.id}`)).json.state === 'succeeded', 'the job ends');
 });
 
+/** The document describes the redirect, with its headers. */
+async function documented(reply, target) {
+  const document = JSON.parse(await readFile(path.join(root, 'api/openapi.json'), 'utf8'));
+  const { $ref } = document.paths[target].get.responses[reply.status];
+  const { headers, content } = document.components.responses[$ref.split('/').pop()];
+  assert.equal(content, undefined);
+  assert.equal((await reply.arrayBuffer()).byteLength, 0);
+  const plain = /^(date|connection|content-length|keep-alive|x-content-type-options)$/;
+  const names = Object.keys(headers).map((name) => name.toLowerCase());
+  for (const [name] of reply.headers) assert.ok(plain.test(name) || names.includes(name), `${target}: ${name}`);
+  for (const name of ['location', 'cache-control', 'x-request-id']) assert.ok(reply.headers.has(name), name);
+}
+
 test('assets=redirect sends the caller to S3', async (t) => {
   const { d } = await stored(t, 'redirect', '--assets', 'redirect');
   const shapes = [];
@@ -207,7 +220,14 @@ test('assets=redirect sends the caller to S3', async (t) => {
   const asset = new URL(`/v1/supermeshes/${id}/asset.glb`, d.url);
   const reply = await fetch(asset, { redirect: 'manual' });
   assert.equal(reply.status, 307);
+  await documented(reply, '/v1/supermeshes/{id}/asset.glb');
+  const morph = new URL('/v1/morph.glb', d.url);
+  morph.searchParams.set('shapes', shapes.map(({ mesh }) => mesh).join(','));
+  const same = await fetch(morph, { redirect: 'manual' });
+  assert.equal(same.status, 307);
+  await documented(same, '/v1/morph.glb');
   const to = reply.headers.get('location');
+  assert.equal(new URL(same.headers.get('location')).pathname, new URL(to).pathname);
   assert.ok(to.startsWith(`${server}/objects/redirect/asset/`));
   const bytes = await fetch(to);
   assert.equal(bytes.status, 200);

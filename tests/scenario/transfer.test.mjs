@@ -5,7 +5,7 @@ import { rigged } from '../samples/rigged.mjs';
 import { assertProblem, daemon } from './support/daemon.mjs';
 import { writeGlb } from './support/glb_write.mjs';
 import * as shapes from './support/shapes.mjs';
-import { assetOf, near, shown, uploaded } from './support/transferred.mjs';
+import { assetOf, inCharts, near, shown, uploaded } from './support/transferred.mjs';
 
 const METHODS = ['adaptive', 'overlay', 'subdivision', 'convex-hull', 'template'];
 const asset = { fit: 'none', animation: 'none' };
@@ -16,22 +16,8 @@ const wide = ([, y, z], east) => [(east ? 0.75 : 0.25) + 0.1 * y, 0.5 + 0.2 * z]
 
 /** A bean with colours, a set of texture coordinates without seams, and one of two charts that meet at x = 0. */
 function painted() {
-  const { positions, points, triangles } = shapes.bean(3);
-  const made = { positions: [], uv: [], triangles: [] };
-  const known = new Map();
-  for (const t of triangles) {
-    const east = t.reduce((sum, v) => sum + points[v][0], 0) > 0;
-    made.triangles.push(
-      t.map((v) => {
-        const key = `${v} ${east}`;
-        if (!known.has(key)) {
-          known.set(key, made.positions.push(positions[v]) - 1);
-          made.uv.push(wide(positions[v], east));
-        }
-        return known.get(key);
-      }),
-    );
-  }
+  const bean = shapes.bean(3);
+  const made = inCharts(bean, (v, east) => wide(bean.positions[v], east));
   return { ...made, uv1: made.positions.map(flat), colors: made.positions.map(tint) };
 }
 

@@ -48,6 +48,13 @@ function posed({ gltf, read }, { POSITION, JOINTS_0, WEIGHTS_0 }, moved = {}) {
   });
 }
 
+/** Where the joints are at rest. */
+function rests({ gltf }) {
+  const parent = new Map(gltf.nodes.flatMap(({ children = [] }, n) => children.map((c) => [c, n])));
+  const world = (n) => (parent.has(n) ? times(world(parent.get(n)), local(gltf.nodes[n])) : local(gltf.nodes[n]));
+  return gltf.skins[0].joints.map((n) => world(n).slice(12, 15));
+}
+
 /** The weights at the places that `at` gives: those of the sample, blended on its triangles. */
 function assertWeights({ JOINTS_0, WEIGHTS_0 }, at) {
   for (const [v, [, y]] of at.entries()) {
@@ -92,7 +99,10 @@ for (const method of ['adaptive', 'overlay', 'subdivision', 'convex-hull', 'temp
         Array.from({ length: JOINTS }, (_, j) => `joint ${j}`),
       );
       assert.equal(gltf.nodes.length, 1 + JOINTS, 'the mesh and the joints, nothing else of the sample');
-      assert.deepEqual([...read(gltf.skins[0].inverseBindMatrices)].slice(-4, -1), [0, Math.fround(-HEIGHT), 0]);
+      const low = [0, 1, 2].map((k) => Math.min(...places.map((_, v) => all[0].POSITION[3 * v + k])));
+      const high = [0, 1, 2].map((k) => Math.max(...places.map((_, v) => all[0].POSITION[3 * v + k])));
+      for (const p of rests(result))
+        p.forEach((x, k) => assert.ok(x > low[k] - 0.1 && x < high[k] + 0.1, `${p} is in the egg: ${low}, ${high}`));
       posed(result, all[0]).forEach((p, v) =>
         near(p, all[0].POSITION.slice(3 * v, 3 * v + 3), 1e-5, 'the skeleton at rest moves nothing'),
       );
@@ -151,6 +161,40 @@ test('the skin of a larger shape moves with it', async (t) => {
   });
 });
 
+test('the joints and their animations follow the base', async (t) => {
+  const d = await daemon(t);
+  const body = await uploaded(d, rigged().bytes, { name: 'body', repair: 'largest_component' });
+  const { surface } = rigged();
+  const large = { ...surface, positions: surface.positions.map(([x, y, z]) => [3 * x + 5, 3 * y - 1, 3 * z]) };
+  const file = await uploaded(d, shapes.obj(large), { name: 'large' });
+  const request = { shapes: [file, body], asset: { fit: 'none' }, transfer: [{ from: 1, what: 'skin' }] };
+  const made = await d.made('/v1/supermeshes', request);
+  const result = await assetOf(d, made);
+  const [part] = result.all;
+  posed(result, part).forEach((p, v) => near(p, part.POSITION.slice(3 * v, 3 * v + 3), 1e-4, 'at rest'));
+  // The joints are as near to their places as the points of the map are.
+  const slip = shown(part).map(([x, y, z], v) =>
+    Math.hypot(...[3 * x + 5, 3 * y - 1, 3 * z].map((c, k) => c - part.POSITION[3 * v + k])),
+  );
+  assert.ok(Math.max(...slip) < 0.3, `the map is nearly that of the shapes: ${Math.max(...slip)}`);
+  rests(result).forEach((p, j) => near(p, [5, (3 * HEIGHT * j) / (JOINTS - 1) - 1, 0], 0.3, `joint ${j}`));
+
+  const { animations, nodes } = result.gltf;
+  assert.deepEqual(
+    animations.map(({ name }) => name),
+    ['wave', 'morph'],
+  );
+  const [{ channels, samplers }] = animations;
+  assert.deepEqual(
+    channels.map(({ target }) => [nodes[target.node].name, target.path]),
+    [['joint 9', 'rotation']],
+    'the targets of the body are not taken, nor what moves them',
+  );
+  const sine = Math.fround(Math.sin(0.3));
+  assert.deepEqual([...result.read(samplers[0].input)], [0, 0.5, 1]);
+  assert.deepEqual([...result.read(samplers[0].output)].slice(0, 7), [0, 0, 0, 1, 0, 0, sine]);
+});
+
 test('the own skin and targets of the first shape, on a new mesh', async (t) => {
   const d = await daemon(t);
   const body = await uploaded(d, rigged().bytes, { name: 'body', repair: 'largest_component' });
@@ -161,8 +205,14 @@ test('the own skin and targets of the first shape, on a new mesh', async (t) => 
   const transfer = ['skin', 'targets'].map((what) => ({ from: 0, what }));
   const made = await d.made('/v1/supermeshes', { ...request, transfer });
   assert.deepEqual(lacks(made), []);
+  const { why } = made.dropped.find(({ what }) => what === 'animations');
+  assert.equal(why, 'Of the animations, the asset has those of its skeleton.', 'not those of its targets');
   const result = await assetOf(d, made);
   assert.deepEqual(result.gltf.meshes[0].extras.targetNames, ['egg', 'smile']);
+  const joints = result.gltf.nodes.filter(({ name }) => /^joint/.test(name));
+  joints.forEach((node, j) =>
+    assert.deepEqual(node.translation, [0, j ? HEIGHT / (JOINTS - 1) : 0, 0], 'its own fits'),
+  );
   assert.equal(result.all.length, 2, 'a part for each material');
   for (const part of result.all) {
     const places = Array.from({ length: part.POSITION.length / 3 }, (_, v) => part.POSITION.slice(3 * v, 3 * v + 3));
@@ -196,6 +246,22 @@ test('targets of equal names get a number', async (t) => {
   assert.deepEqual(await named(twice, { method: 'adaptive' }, [1, 2]), ['smile', 'other', 'smile (2)', 'smile (3)']);
   const kept = [shape(body, 'body'), shape(body, 'other')];
   assert.deepEqual(await named(kept, { method: 'template' }, [1]), ['smile', 'other', 'smile (2)']);
+
+  // Names are cut between characters, and what the report calls a target is its name in the asset.
+  for (const [name, cut] of [
+    ['x'.repeat(127), 'x'.repeat(127)],
+    ['é'.repeat(80), 'é'.repeat(63)],
+  ]) {
+    const bean = shapes.bean(2);
+    const edit = (gltf) => {
+      gltf.meshes[0].extras = { targetNames: [name] };
+    };
+    const bytes = writeGlb({ ...bean, moves: bean.positions.map(() => [0, 0.1, 0]), edit });
+    const other = await uploaded(d, bytes, { name: 'bean' });
+    const list = [shape(egg, 'egg'), shape(other, 'one'), shape(other, 'two')];
+    const names = await named(list, { method: 'adaptive' }, [1, 2]);
+    assert.deepEqual(names, ['one', 'two', cut, `${cut} (2)`]);
+  }
 });
 
 test('a skin that cannot be taken is refused', async (t) => {

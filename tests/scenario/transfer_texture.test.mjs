@@ -7,7 +7,7 @@ import { daemon } from './support/daemon.mjs';
 import { writeGlb } from './support/glb_write.mjs';
 import { readPng, writePng } from './support/png.mjs';
 import * as shapes from './support/shapes.mjs';
-import { assetOf, shown, uploaded } from './support/transferred.mjs';
+import { assetOf, inCharts, shown, uploaded } from './support/transferred.mjs';
 
 const asset = { fit: 'none', animation: 'none' };
 const SIDE = 128; // of the texture of the bean
@@ -23,26 +23,13 @@ const painted = (more = {}) => {
 
 /** A ball with two charts side by side, which meet at x = 0. */
 function unwrapped() {
-  const { positions, points, triangles } = shapes.egg(3);
-  const made = { positions: [], uv: [], triangles: [] };
-  const known = new Map();
-  for (const t of triangles) {
-    const east = t.reduce((sum, v) => sum + points[v][0], 0) > 0;
-    made.triangles.push(
-      t.map((v) => {
-        const key = `${v} ${east}`;
-        if (!known.has(key)) {
-          const [x, y, z] = points[v];
-          const round = Math.acos(Math.min(1, Math.abs(x))) / (Math.PI / 2); // 1 at the seam
-          const wide = Math.hypot(y, z) || 1;
-          made.uv.push([(east ? 0.74 : 0.26) + (0.22 * round * y) / wide, 0.5 + (0.42 * round * z) / wide]);
-          known.set(key, made.positions.push(positions[v]) - 1);
-        }
-        return known.get(key);
-      }),
-    );
-  }
-  return made;
+  const egg = shapes.egg(3);
+  return inCharts(egg, (v, east) => {
+    const [x, y, z] = egg.points[v];
+    const round = Math.acos(Math.min(1, Math.abs(x))) / (Math.PI / 2); // 1 at the seam
+    const wide = Math.hypot(y, z) || 1;
+    return [(east ? 0.74 : 0.26) + (0.22 * round * y) / wide, 0.5 + (0.42 * round * z) / wide];
+  });
 }
 
 /** The picture of a material, and its colour at texture coordinates, as viewers blend it. */

@@ -1,5 +1,6 @@
 /* The jobs of several nodes in PostgreSQL: claims in the order of fairness, leases, fencing, one flight a key, what
  * jobs wait for. Two catalogues on one schema stand for two nodes. Runs under tests/tools/with_postgresql.sh. */
+#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,7 +13,10 @@
 #include <cmocka.h>
 
 #include "store/notices.h"
+#include "store/object_lock.h"
+#include "store/owners.h"
 #include "store/shared.h"
+#include "store/transactions.h"
 
 typedef struct nodes {
   char url[256];
@@ -215,24 +219,36 @@ static int is_waiting(nodes *n, const char *id, job_mark *mark) {
   return mark->queued;
 }
 
+/* The first node's job of this row waits for one whose key has digit 2. */
+static store_result wait_for_2(nodes *n, const job_row *row) {
+  char keys[1][API_ID_SIZE];
+  const char *const requests[] = {"{}"};
+  const int64_t costs[] = {5};
+  fill(keys[0], '2');
+  const job_needs needs = {.row = row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
+  return catalogue_job_wait(n->cat[0], &needs);
+}
+
+/* Claims a job whose key has this digit. */
+static void claim_key(nodes *n, int node, char digit, job_claim *out) {
+  char key[API_ID_SIZE];
+  fill(key, digit);
+  assert_int_equal(claim(n, node, out), STORE_OK);
+  assert_string_equal(out->row.key, key);
+}
+
 static void test_needs(void **state) {
   nodes *n = *state;
   job_row row;
   job_claim whole, part;
   job_mark mark;
-  char keys[1][API_ID_SIZE];
-  const char *const requests[] = {"{}"};
-  const int64_t costs[] = {5};
   submit(n, 0, "ann", '1', 0, &row);
-  assert_int_equal(claim(n, 0, &whole), STORE_OK);
-  fill(keys[0], '2');
-  const job_needs needs = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
-  assert_int_equal(catalogue_job_wait(n->cat[0], &needs), STORE_OK);
+  claim_key(n, 0, '1', &whole);
+  assert_int_equal(wait_for_2(n, &whole.row), STORE_OK);
   assert_true(is_waiting(n, row.id, &mark));
   assert_int_equal(mark.state, API_JOB_QUEUED);
   assert_int_equal(mark.attempt, 0); /* that attempt does not count */
-  assert_int_equal(claim(n, 1, &part), STORE_OK);
-  assert_string_equal(part.row.key, keys[0]);
+  claim_key(n, 1, '2', &part);
   assert_true(is_waiting(n, row.id, &mark));
   assert_int_equal(mark.state, API_JOB_RUNNING); /* as callers see it */
   job_claim none;
@@ -243,30 +259,23 @@ static void test_needs(void **state) {
   assert_int_equal(whole.row.attempt, 1);
 }
 
-/* Cancelling who waits also cancels what only he needs. */
+/* Cancelling a job that waits also cancels the jobs that it alone needs. */
 static void test_cancel(void **state) {
   nodes *n = *state;
   job_row row;
   job_claim whole, part;
-  char keys[1][API_ID_SIZE];
-  const char *const requests[] = {"{}"};
-  const int64_t costs[] = {5};
   submit(n, 0, "ann", '1', 0, &row);
-  assert_int_equal(claim(n, 0, &whole), STORE_OK);
-  fill(keys[0], '2');
-  const job_needs needs = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
-  assert_int_equal(catalogue_job_wait(n->cat[0], &needs), STORE_OK);
+  claim_key(n, 0, '1', &whole);
+  assert_int_equal(wait_for_2(n, &whole.row), STORE_OK);
   assert_int_equal(catalogue_job_cancel(n->cat[1], row.id), STORE_OK);
   whole.row.attempt = 0;
   assert_int_equal(finish(n, 1, &whole, API_JOB_CANCELLED, NULL), STORE_OK);
-  assert_int_equal(claim(n, 1, &part), STORE_OK);
-  assert_string_equal(part.row.key, keys[0]);
+  claim_key(n, 1, '2', &part);
   assert_true(part.cancel);
   submit(n, 0, "ann", '3', 0, &row);
-  assert_int_equal(claim(n, 0, &whole), STORE_OK);
+  claim_key(n, 0, '3', &whole);
   assert_int_equal(catalogue_job_cancel(n->cat[1], row.id), STORE_OK);
-  const job_needs late = {.row = &whole.row, .keys = keys, .requests = requests, .costs = costs, .count = 1};
-  assert_int_equal(catalogue_job_wait(n->cat[0], &late), STORE_CONFLICT);
+  assert_int_equal(wait_for_2(n, &whole.row), STORE_CONFLICT);
 }
 
 static void note(void *user, const char *text) {
@@ -296,6 +305,143 @@ static void test_notices(void **state) {
   assert_false(notices_keeps_house(n->bell[1]));
 }
 
+static store_result put_mesh(nodes *n, char digit) {
+  char json[] = "{}";
+  int fresh;
+  resource row = {.kind = RESOURCE_MESH, .json = json, .bytes = 1, .created = 1};
+  fill(row.id, digit);
+  fill(row.sha, digit);
+  return catalogue_put_for(n->cat[0], &row, "", 0, &fresh);
+}
+
+static int has_mesh(nodes *n, char digit) {
+  char id[API_ID_SIZE];
+  resource row = {0};
+  fill(id, digit);
+  store_result found = catalogue_get(n->cat[1], RESOURCE_MESH, id, &row);
+  resource_free(&row);
+  return found == STORE_OK;
+}
+
+/* The first column of a query that takes the class of an advisory lock. */
+static int64_t ask_of_lock(nodes *n, const char *sql, int class) {
+  database *db = catalogue_reader(n->cat[1]);
+  sql_statement *st = database_statement(db, sql);
+  assert_non_null(st);
+  sql_bind_integer(st, 1, class);
+  assert_int_equal(sql_step(st), SQL_ROW);
+  int64_t value = sql_integer(st, 0);
+  sql_reset(st);
+  catalogue_reader_done(n->cat[1], db);
+  return value;
+}
+
+/* Cuts the connections that have the lock of objects, and waits until the server has dropped it. */
+static void cut_lock(nodes *n) {
+  assert_int_equal(ask_of_lock(n,
+                               "SELECT count(pg_terminate_backend(pid, 60000)) FROM pg_locks WHERE locktype='advisory' "
+                               "AND classid=?1::oid AND objsubid=2",
+                               SQL_LOCK_OBJECTS),
+                   1);
+}
+
+static void test_publishing(void **state) {
+  nodes *n = *state;
+  object_lock *here = object_lock_open(n->url), *there = object_lock_open(n->url);
+  assert_true(here && there);
+  assert_int_equal(put_mesh(n, '0'), STORE_OK); /* of no objects */
+  assert_true(object_lock_share(here));
+  assert_int_equal(put_mesh(n, '1'), STORE_OK);
+  cut_lock(n);
+  assert_int_equal(put_mesh(n, '2'), STORE_LOST);
+  assert_true(object_lock_exclude(there)); /* what was published may be deleted now */
+  object_lock_let_go(there);
+  assert_int_equal(put_mesh(n, '2'), STORE_LOST);
+  object_lock_unshare(here);
+  assert_false(has_mesh(n, '2'));
+  assert_true(object_lock_share(here)); /* published again */
+  assert_int_equal(put_mesh(n, '2'), STORE_OK);
+  object_lock_unshare(here);
+  object_lock_close(here);
+  object_lock_close(there);
+}
+
+typedef struct publisher {
+  nodes *n;
+  object_lock *lock;
+  char digit;
+  store_result stored;
+} publisher;
+
+static void *publish(void *argument) {
+  publisher *p = argument;
+  object_lock_share(p->lock);
+  p->stored = put_mesh(p->n, p->digit);
+  object_lock_unshare(p->lock);
+  return NULL;
+}
+
+/* A thread that begins to share after the lock was lost takes it for itself, not for those before it. */
+static void test_publishing_together(void **state) {
+  nodes *n = *state;
+  object_lock *lock = object_lock_open(n->url);
+  publisher other = {.n = n, .lock = lock, .digit = '1', .stored = STORE_ERROR};
+  pthread_t thread;
+  assert_true(object_lock_share(lock));
+  for (int lost = 0; lost < 2; lost++, other.digit++) {
+    if (lost) {
+      cut_lock(n);
+    }
+    assert_int_equal(pthread_create(&thread, NULL, publish, &other), 0);
+    assert_int_equal(pthread_join(thread, NULL), 0);
+    assert_int_equal(other.stored, STORE_OK);
+    assert_int_equal(put_mesh(n, '5'), lost ? STORE_LOST : STORE_OK);
+  }
+  object_lock_unshare(lock);
+  object_lock_close(lock);
+}
+
+typedef struct excluder {
+  nodes *n;
+  object_lock *lock;
+  pthread_t thread;
+  int has, failed; /* __atomic */
+} excluder;
+
+static void *exclude(void *argument) {
+  excluder *e = argument;
+  __atomic_store_n(object_lock_exclude(e->lock) ? &e->has : &e->failed, 1, __ATOMIC_RELEASE);
+  return NULL;
+}
+
+/* A transaction that may have looked while the lock was held: it goes on until somebody waits for its end. */
+static int wait_within(database *db, void *argument) {
+  excluder *e = argument;
+  (void)db;
+  if (pthread_create(&e->thread, NULL, exclude, e) != 0) {
+    return SQL_ERROR;
+  }
+  while (!ask_of_lock(e->n,
+                      "SELECT count(*) FROM pg_locks WHERE locktype='advisory' AND classid=?1::oid AND NOT granted",
+                      SQL_LOCK_WRITES)) {
+    if (__atomic_load_n(&e->has, __ATOMIC_ACQUIRE) || __atomic_load_n(&e->failed, __ATOMIC_ACQUIRE)) {
+      return SQL_CONSTRAINT;
+    }
+  }
+  return SQL_OK;
+}
+
+static void test_excluding_waits_for_transactions(void **state) {
+  nodes *n = *state;
+  excluder e = {.n = n, .lock = object_lock_open(n->url)};
+  assert_non_null(e.lock);
+  assert_int_equal(catalogue_write(n->cat[0], wait_within, &e), STORE_OK);
+  assert_int_equal(pthread_join(e.thread, NULL), 0);
+  assert_true(e.has);
+  object_lock_let_go(e.lock);
+  object_lock_close(e.lock);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_order, setup, teardown),
@@ -307,6 +453,9 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_needs, setup, teardown),
       cmocka_unit_test_setup_teardown(test_cancel, setup, teardown),
       cmocka_unit_test_setup_teardown(test_notices, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_publishing, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_publishing_together, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_excluding_waits_for_transactions, setup, teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -55,7 +55,7 @@ static void pass(queue *q, job *j, int64_t ms) {
 static void end_after(queue *q, job *j, int64_t ms) {
   assert_int_equal(queue_claim(q, j), STORE_OK);
   pass(q, j, ms);
-  queue_finish(q, j, API_JOB_CANCELLED, NULL, NULL);
+  queue_finish(q, j, API_JOB_CANCELLED, NULL);
 }
 
 /* Every mesh is as large as the others, but those of one owner take ten times as long. */
@@ -208,7 +208,7 @@ static void sleep_ms(int ms) {
 
 static void note(task *t) {
   noted *n = (noted *)(void *)t;
-  n->at = (*n->next)++;
+  n->at = __atomic_fetch_add(n->next, 1, __ATOMIC_RELAXED); /* another thread may read it meanwhile */
   sleep_ms(n->ms);
 }
 

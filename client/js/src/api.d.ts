@@ -266,7 +266,7 @@ export type SupermeshRequest = {
     /** Names of nodes: the meshes that they and the nodes below them show. */
     nodes?: string[];
   };
-  /** What the asset gets of the shapes besides their surfaces, by places: the skin with its skeleton; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) where the shape does not have it. `transferred` of the supermesh says what came of it. Such an asset has the profile float only. */
+  /** What the asset gets from the shapes besides their surfaces, at the same places: the skin with its skeleton, fitted to the first shape, and its animations; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) if a shape does not have what is asked of it. `transferred` of the supermesh lists what the asset got. An asset that got anything but targets has the profile float only. */
   transfer?: Array<{
     /** The shape, from 0 in their order. */
     from: number;
@@ -359,7 +359,7 @@ export type Supermesh = {
   url: string;
   asset: string;
   asset_bytes: number;
-  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh, and where the asset is an uploaded glTF document or has something by `transfer`: these have the profile float only. */
+  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh, and where the asset is an uploaded glTF document or got anything but targets by `transfer`: these have the profile float only. */
   profiles?: {
     /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound, to be added to hausdorff_relative. */
     quantization_relative: number | null;

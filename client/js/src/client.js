@@ -336,7 +336,8 @@ export class Orbmorph {
   /**
    * The URL of a morph: its GET computes the morph if nobody has. `recipe`: `shapes` (ids of meshes), and optionally
    * `names`, `landmarks` (an id, or "auto"), `align`, `preset`, `remesh`, `tolerance`, `max_triangles`, `fit`, `path`,
-   * `animation`, `normals`, `holes`, `profile` and `wait`.
+   * `animation`, `normals`, `holes`, `transfer` (a list of entries such as '1:skin'), `profile` and
+   * `wait`.
    */
   morphUrl(recipe) {
     const query = Object.entries(clean(recipe)).map(

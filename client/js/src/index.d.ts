@@ -116,6 +116,8 @@ export interface Recipe {
   animation?: 'pingpong' | 'none';
   normals?: boolean;
   holes?: 'reopen' | 'filled';
+  /** Entries such as '1:skin' or '1:texture:2048'. */
+  transfer?: string | string[];
   profile?: Profile;
   wait?: number;
 }

@@ -5,6 +5,7 @@ import type { MorphData } from './mesh/morph';
 import type { MeasureName, SphereData } from './mesh/distortion';
 import type { Other } from './mesh/others';
 import type { Spot } from './mesh/worker';
+import { EXTRAS, type Extra } from './mesh/extras';
 import type { Model } from './view/models';
 
 export type Tab = 'shapes' | 'landmarks' | 'morph' | 'spheres';
@@ -21,6 +22,10 @@ export interface Shape {
   /** whether it has one clear plane of symmetry; undefined until that is known */
   symmetric?: boolean;
   facts?: { vertices: number; triangles: number; format: string };
+  /** what its file has besides the surface, as far as the page can read it */
+  extras?: Extra[];
+  /** what of that the morph takes */
+  taken?: Extra[];
   /** The repairs that it was uploaded with. */
   repair?: string;
   problem?: Problem;
@@ -116,7 +121,9 @@ export interface Result {
   supermesh: Supermesh;
   request: SupermeshRequest | null;
   matches: Matches | null;
-  data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles'>;
+  data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles' | 'looks'>;
+  /** which of the looks is shown */
+  look: number;
   main: Model;
   each: Model[];
   /** the shapes, painted by how much the morph stretches them, once that is measured */
@@ -271,5 +278,23 @@ export function wireLandmarks(shapes = readyShapes()): WireLandmark[] {
 /** The landmarks that a morph would use. */
 export const givenLandmarks = (shapes = readyShapes()): WireLandmark[] =>
   state.landmarks === state.listed ? [] : wireLandmarks(shapes);
+
+/** Whether a file has something besides its surface. */
+const hasExtra = (shape: Shape | undefined, what: Extra) =>
+  !!shape?.extras?.includes(what) || !!shape?.mesh?.attributes?.some((name) => name === what);
+
+/** What the morph can take from a shape: not from the first one, whose materials it has, and no second skin. */
+export function extrasOf(shape: Shape): Extra[] {
+  const [first] = readyShapes();
+  if (!shape.mesh || shape === first) return [];
+  return EXTRAS.filter((what) => {
+    if (what === 'texture' && !hasExtra(first, 'texcoord')) return false; // there is nothing to paint it on
+    if (what === 'skin' && state.options.remesh === 'template' && hasExtra(first, 'skin')) return false;
+    return hasExtra(shape, what);
+  });
+}
+
+/** What the morph takes from a shape. */
+export const takenFrom = (shape: Shape): Extra[] => extrasOf(shape).filter((what) => shape.taken?.includes(what));
 
 export const readyShapes = () => state.shapes.filter((shape) => shape.state === 'ready' && shape.mesh);

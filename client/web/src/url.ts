@@ -3,10 +3,24 @@
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
  * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), q: the best match, which of its
  * matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
- * cam: camera, o: options.
+ * cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: the variant of its materials.
  */
 import type { Place } from 'orbmorph';
-import { client, DEFAULTS, readyShapes, set, state, TABS, watch, type Matches, type Options, type Tab } from './state';
+import {
+  client,
+  DEFAULTS,
+  patch,
+  readyShapes,
+  set,
+  state,
+  TABS,
+  takenFrom,
+  watch,
+  type Matches,
+  type Options,
+  type Tab,
+} from './state';
+import { EXTRAS } from './mesh/extras';
 import { addFromServer } from './actions/shapes';
 import { takeLandmarks } from './actions/landmarks';
 import { matchesOf, openResult, resumeJob } from './actions/merge';
@@ -58,6 +72,19 @@ function decodeOptions(text: string): Options {
   };
 }
 
+const encodeTaken = () =>
+  readyShapes()
+    .flatMap((shape, i) => takenFrom(shape).map((what) => `${i}:${what}`))
+    .join(',');
+
+function restoreTaken(text: string) {
+  for (const [number, name] of text.split(',').map((entry) => entry.split(':'))) {
+    const shape = readyShapes()[Number(number)];
+    const what = EXTRAS.find((known) => known === name);
+    if (shape && what) patch(shape, { taken: [...(shape.taken ?? []), what] });
+  }
+}
+
 /** Of several matches: ID of the best one, number of the shown one, number of the one that is computed. */
 function encodeMatch(): string {
   const { result, running } = state;
@@ -98,6 +125,8 @@ function encode(): string {
       .join(';'),
   );
   if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
+  put('x', encodeTaken());
+  if (state.result?.look) put('look', String(state.result.look));
   if (state.paint !== 'direction') put('paint', state.paint);
   if (state.side !== 'before') put('side', state.side);
   if (state.show !== 'morph') put('show', state.show);
@@ -156,6 +185,7 @@ export async function restore() {
       await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
       set({ loading: null });
       const lost = meshes.filter((m) => m.status === 'rejected').length;
+      if (!lost) restoreTaken(query.get('x') ?? '');
       if (lost === ids.length) dead(`its ${lost > 1 ? `${lost} shapes are` : 'shape is'}`);
       else if (lost)
         set({
@@ -183,7 +213,8 @@ export async function restore() {
         decodeMatch(query.get('q') ?? ''),
       ]);
       next = matches.next;
-      if (supermesh) await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown });
+      const look = Number(query.get('look')) || 0;
+      if (supermesh) await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown, look });
       else if (!state.problem)
         set({
           problem: {

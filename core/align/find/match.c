@@ -35,7 +35,7 @@ typedef struct scaling {
   double middle[3], scale;
 } scaling;
 
-typedef struct search {
+typedef struct orb_match_search {
   orb_context *ctx;
   const orb_mesh *mesh[2];
   scaling scaling[2];
@@ -45,6 +45,8 @@ typedef struct search {
   int32_t *rotated[2]; /* the rotations' maps, one after the other: as those of `dense` */
   trial trial[TRIALS];
   int32_t count;
+  int32_t list[1 + ORB_MATCH_OTHERS]; /* the best trial and those that differ, in the order of the match */
+  int32_t listed;
   /* of the loop that registers */
   int32_t task[2 * TRIALS]; /* 2 · trial + direction */
   orb_status status[2 * TRIALS];
@@ -266,27 +268,27 @@ static int is_before(const trial *x, const trial *y) {
   return x->cost < INFINITY || y->cost < INFINITY ? x->cost < y->cost : x->rough < y->rough;
 }
 
-/* The best trial and, in order, those that differ from it and from each other. Returns how many. */
-static int32_t list_different(const search *t, int32_t out[1 + ORB_MATCH_OTHERS]) {
-  int32_t count = 1;
-  out[0] = best_of(t);
-  while (count < 1 + ORB_MATCH_OTHERS) {
+/* Lists the best trial and, in order, those that differ from it and from each other. */
+static void list_different(search *t) {
+  t->list[0] = best_of(t);
+  t->listed = 1;
+  while (t->listed < 1 + ORB_MATCH_OTHERS) {
     int32_t next = -1;
     for (int32_t i = 0; i < t->count; i++) {
-      if ((next < 0 || is_before(&t->trial[i], &t->trial[next])) && is_different(t, &t->trial[i], out, count)) {
+      if ((next < 0 || is_before(&t->trial[i], &t->trial[next])) && is_different(t, &t->trial[i], t->list, t->listed)) {
         next = i;
       }
     }
     if (next < 0) {
       break;
     }
-    out[count++] = next;
+    t->list[t->listed++] = next;
   }
-  return count;
 }
 
 /* Vertices spread over the first shape, and those nearest to where a trial takes them. */
 static orb_status write_pairs(const search *t, const trial *one, orb_match_pairs *out) {
+  out->count = 0;
   const orb_coarse_copy *copy = t->copy;
   int32_t sample[ORB_MATCH_PAIRS];
   orb_nearest *tree;
@@ -311,21 +313,21 @@ static orb_status write_pairs(const search *t, const trial *one, orb_match_pairs
   return ORB_OK;
 }
 
-/* The best trial and the others, but not the targets. */
+/* The listed trials, but not the targets. */
 static orb_status write_ranking(const search *t, orb_match *out) {
-  int32_t list[1 + ORB_MATCH_OTHERS], count = list_different(t, list);
-  const trial *best = &t->trial[list[0]];
+  const trial *best = &t->trial[t->list[0]];
   double cost = 1;
   out->cost = best->cost;
   out->bend = (best->bend[0] + best->bend[1]) / 2;
-  for (int32_t i = 1; i < count; i++) {
-    const trial *one = &t->trial[list[i]];
+  out->other_count = 0;
+  for (int32_t i = 1; i < t->listed; i++) {
+    const trial *one = &t->trial[t->list[i]];
     orb_match_other *other = &out->other[out->other_count++];
     cost = fmax(cost, one->cost < INFINITY ? one->cost / best->cost : one->rough / best->rough);
     other->cost = cost;
     ORB_TRY(write_pairs(t, one, &other->pairs));
   }
-  out->clear = count > 1 ? 1 - 1 / out->other[0].cost : ORB_FIND_CLEAR_ALONE;
+  out->clear = t->listed > 1 ? 1 - 1 / out->other[0].cost : ORB_FIND_CLEAR_ALONE;
   return write_pairs(t, best, &out->pairs);
 }
 
@@ -335,13 +337,13 @@ static void pose_free(orb_context *ctx, orb_elastic_pose *pose) {
 }
 
 /* Settles a finer copy of the second shape on one of the first, and carries its pose to all vertices. */
-static orb_status write_targets(const search *t, const trial *best, orb_match *out) {
+static orb_status write_targets(const search *t, const trial *one, double **target) {
   orb_coarse_copy fine[2] = {{{0}, NULL, NULL}, {{0}, NULL, NULL}};
   orb_elastic_pose pose = {NULL, NULL}, all = {NULL, NULL};
   size_t count = 3 * (size_t)t->mesh[1]->vertex_count;
   double *points = ORB_NEW(t->ctx, double, count);
   orb_status status = ORB_E_NO_MEMORY;
-  all.position = out->target = ORB_NEW(t->ctx, double, count);
+  all.position = *target = ORB_NEW(t->ctx, double, count);
   if (!points || !all.position) {
     goto end;
   }
@@ -355,7 +357,7 @@ static orb_status write_targets(const search *t, const trial *best, orb_match *o
     status = ORB_E_NO_MEMORY;
     goto end;
   }
-  ORB_GO(status, orb_elastic_carry(t->ctx, &t->copy[1].mesh, &best->pose[1], fine[1].mesh.positions, (int32_t)n, &pose),
+  ORB_GO(status, orb_elastic_carry(t->ctx, &t->copy[1].mesh, &one->pose[1], fine[1].mesh.positions, (int32_t)n, &pose),
          end);
   ORB_GO(status, orb_elastic_settle(t->ctx, &fine[1].mesh, &fine[0].mesh, &pose), end);
   for (size_t i = 0; i < count; i++) {
@@ -363,7 +365,7 @@ static orb_status write_targets(const search *t, const trial *best, orb_match *o
   }
   ORB_GO(status, orb_elastic_carry(t->ctx, &fine[1].mesh, &pose, points, t->mesh[1]->vertex_count, &all), end);
   for (size_t i = 0; i < count; i++) {
-    out->target[i] = out->target[i] / t->scaling[0].scale + t->scaling[0].middle[i % 3];
+    all.position[i] = all.position[i] / t->scaling[0].scale + t->scaling[0].middle[i % 3];
   }
 end:
   orb_free(t->ctx, points);
@@ -419,21 +421,12 @@ static orb_status run(search *t, const orb_match_hint *hint, orb_match *out) {
     return ORB_OK;
   }
   out->is_found = 1;
+  list_different(t);
   ORB_TRY(write_ranking(t, out));
-  return write_targets(t, &t->trial[best], out);
+  return write_targets(t, &t->trial[best], &out->target);
 }
 
-orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
-                          orb_match *out) {
-  memset(out, 0, sizeof *out);
-  search *t = ORB_NEW0(ctx, search, 1);
-  if (!t) {
-    return ORB_E_NO_MEMORY;
-  }
-  t->ctx = ctx;
-  t->mesh[0] = first;
-  t->mesh[1] = second;
-  orb_status status = run(t, hint, out);
+static void search_free(orb_context *ctx, search *t) {
   for (int32_t i = 0; i < t->count; i++) {
     pose_free(ctx, &t->trial[i].pose[0]);
     pose_free(ctx, &t->trial[i].pose[1]);
@@ -446,10 +439,52 @@ orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mes
   orb_free(ctx, t->dense.forth);
   orb_free(ctx, t->dense.back);
   orb_free(ctx, t);
-  return status;
+}
+
+orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
+                          orb_match *out) {
+  memset(out, 0, sizeof *out);
+  search *t = out->search = ORB_NEW0(ctx, search, 1);
+  if (!t) {
+    return ORB_E_NO_MEMORY;
+  }
+  t->ctx = ctx;
+  t->mesh[0] = first;
+  t->mesh[1] = second;
+  return run(t, hint, out);
+}
+
+orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target) {
+  search *t = match->search;
+  trial *one = &t->trial[t->list[1 + k]];
+  ORB_ASSERT(k < match->other_count && t->ctx == ctx);
+  *target = NULL;
+  if (!(one->cost < INFINITY)) { /* it was dropped before its way back was registered */
+    t->task[0] = 2 * t->list[1 + k] + 1;
+    register_tasks(t, 0, 1, 0);
+    ORB_TRY(t->status[0]);
+    fill_cost(t, one, 2);
+  }
+  return write_targets(t, one, target);
+}
+
+orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear) {
+  search *t = match->search;
+  const int32_t chosen = t->list[1 + k];
+  ORB_ASSERT(k < match->other_count && t->trial[chosen].cost < INFINITY);
+  memmove(t->list + 1, t->list, (size_t)(1 + k) * sizeof *t->list);
+  t->list[0] = chosen;
+  orb_free(ctx, match->target);
+  match->target = target;
+  ORB_TRY(write_ranking(t, match));
+  match->clear = clear;
+  return ORB_OK;
 }
 
 void orb_match_free(orb_context *ctx, orb_match *match) {
+  if (match->search) {
+    search_free(ctx, match->search);
+  }
   orb_free(ctx, match->target);
   memset(match, 0, sizeof *match);
 }

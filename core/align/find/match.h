@@ -38,6 +38,8 @@ typedef struct orb_match_other {
   orb_match_pairs pairs;
 } orb_match_other;
 
+typedef struct orb_match_search orb_match_search; /* match.c */
+
 typedef struct orb_match {
   int is_found; /* 0: a shape has too few vertices, or no map was found; nothing else is filled then */
   double bend;  /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
@@ -46,7 +48,8 @@ typedef struct orb_match {
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  double *target; /* where each vertex of the second shape lies on the first one, in its space: 3 a vertex */
+  double *target;           /* where each vertex of the second shape lies on the first one, in its space: 3 a vertex */
+  orb_match_search *search; /* the candidates, for the two functions below */
 } orb_match;
 
 /* hint: NULL, or landmarks: then there is a match only if they say that the shapes are one in two poses, and only maps
@@ -54,6 +57,12 @@ typedef struct orb_match {
  * run on all threads, and the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
+/* The target of other[k], which the caller frees: NULL on failure. The meshes of the match must still be there. About
+ * 0.4 s of one thread. */
+ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);
+/* Makes other[k] the best map, and the one that was best the first of the others. target: its own, which the match owns
+ * from then on, also after a failure. clear: how far the other one is behind by what has decided. */
+ORB_MUST_CHECK orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear);
 /* The confidence in a match, 0 to 1, from its bend, its `clear` and the energy of the map that followed it: calibrated
  * from 0.8 on (docs/bench-confidence.md). */
 double orb_match_confidence(double bend, double clear, double energy);

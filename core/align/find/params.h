@@ -31,6 +31,9 @@ static const double ORB_FIND_SPECTRAL_BEHIND = 0.8;
 /* A map that bends this many times as much as the best one in one direction does not win by the other direction: these
  * differ by a factor of 1.5 where the map is right. */
 static const double ORB_FIND_BEHIND = 2;
+/* The energy of the map of the best match above which the next best match is tried as well, unless that bends so many
+ * times as much; and the share of the energy that its map may have at most, where it is taken in its place. */
+static const double ORB_FIND_OTHER_ABOVE = 1.25, ORB_FIND_OTHER_BEHIND = 4, ORB_FIND_OTHER_GAIN = 0.95;
 /* What `clear` is where all other maps are the same. */
 static const double ORB_FIND_CLEAR_ALONE = 0.5;
 

@@ -148,6 +148,18 @@ done:
   return status;
 }
 
+orb_status orb_map_levels_finish(orb_map_run *c, orb_refiner *r, orb_map_level *l, double pull, int rough) {
+  int failed = 0;
+  orb_map_level_store(c, l, r);
+  ORB_TRY(orb_map_levels_refine(c, r, l, pull, rough, &failed));
+  const double energy = failed ? INFINITY : orb_map_level_energy(l);
+  if (energy < c->best_energy) {
+    c->best_energy = energy;
+    orb_refiner_points(r, c->best);
+  }
+  return ORB_OK;
+}
+
 orb_status orb_map_level_place(orb_map_run *c, orb_refiner *r, orb_map_start start, int32_t size, orb_map_level *l) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
   ORB_TRY(orb_refiner_skip(c->ctx, r, size < c->vertex_count ? size : c->vertex_count));

@@ -1,6 +1,5 @@
 #include "align/map/lifted.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "align/map/engine/rounds.h"
@@ -22,7 +21,6 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   orb_refiner *r = NULL;
   orb_map_level level = {0};
   int32_t flips = 0;
-  int failed = 0;
   orb_status status;
   c->pairs.count = c->pairs.landmarks;
   orb_map_levels_adopt(c, copy->hierarchy);
@@ -37,12 +35,7 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   if (flips > 0) {
     goto done;
   }
-  orb_map_level_store(c, &level, r);
-  ORB_GO(status, orb_map_levels_refine(c, r, &level, 0, c->vertex_count > c->params.copies.rough, &failed), done);
-  if (!failed) {
-    c->best_energy = orb_map_level_energy(&level);
-    orb_refiner_points(r, c->best);
-  }
+  status = orb_map_levels_finish(c, r, &level, 0, c->vertex_count > c->params.copies.rough);
 done:
   orb_map_level_free(c->ctx, &level);
   orb_refiner_destroy(c->ctx, r);

@@ -52,7 +52,7 @@ orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
   orb_refiner *r = NULL;
   orb_map_level level = {0};
   int32_t flips = 1, size = start == ORB_MAP_SPATIAL ? c->params.level.spatial : c->params.level.mapped;
-  int failed = 0, given_up = 0, is_given = start == ORB_MAP_GIVEN;
+  int given_up = 0, is_given = start == ORB_MAP_GIVEN;
   orb_status status;
   ORB_GO(status, orb_map_levels_begin(c, &r), done);
   while (flips) {
@@ -69,18 +69,7 @@ orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
   if (start == ORB_MAP_DRAWN) {
     ORB_GO(status, orb_map_draw(c, &level, c->hierarchy->surface.to_mesh), done);
   }
-  orb_map_level_store(c, &level, r);
-  ORB_GO(status,
-         orb_map_levels_refine(c, r, &level, is_given ? 0 : c->params.level.pull, is_given && c->params.work.rough,
-                               &failed),
-         done);
-  if (!failed) {
-    double energy = orb_map_level_energy(&level);
-    if (energy < c->best_energy) {
-      c->best_energy = energy;
-      orb_refiner_points(r, c->best);
-    }
-  }
+  status = orb_map_levels_finish(c, r, &level, is_given ? 0 : c->params.level.pull, is_given && c->params.work.rough);
 done:
   orb_map_level_free(ctx, &level);
   orb_refiner_destroy(ctx, r);

@@ -4,14 +4,6 @@
 
 #include "align/sheet/sheet.h"
 
-void orb_aligned_shape_free(orb_context *ctx, orb_aligned_shape *shape) {
-  orb_mesh_free(ctx, &shape->mesh);
-  orb_free(ctx, shape->parent);
-  orb_free(ctx, shape->points);
-  orb_free(ctx, shape->landmark_vertices);
-  memset(shape, 0, sizeof *shape);
-}
-
 void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   for (int32_t s = 0; alignment->shapes && s < alignment->shape_count; s++) {
     orb_aligned_shape_free(ctx, &alignment->shapes[s]);

@@ -44,11 +44,16 @@ end:
   return status;
 }
 
+void orb_aligned_shape_free(orb_context *ctx, orb_aligned_shape *shape) {
+  orb_mesh_free(ctx, &shape->mesh);
+  orb_free(ctx, shape->parent);
+  orb_free(ctx, shape->points);
+  orb_free(ctx, shape->landmark_vertices);
+  memset(shape, 0, sizeof *shape);
+}
+
 void orb_sheet_free(orb_context *ctx, orb_sheet *sheet) {
-  orb_mesh_free(ctx, &sheet->shape.mesh);
-  orb_free(ctx, sheet->shape.parent);
-  orb_free(ctx, sheet->shape.points);
-  orb_free(ctx, sheet->shape.landmark_vertices);
+  orb_aligned_shape_free(ctx, &sheet->shape);
   orb_free(ctx, sheet->twin);
   orb_free(ctx, sheet->corner);
   orb_free(ctx, sheet->origin);

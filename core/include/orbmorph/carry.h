@@ -24,7 +24,7 @@ ORB_API const char *orb_carry_name(orb_carry_what what);
 enum { ORB_CARRY_MAX = 64, ORB_BAKE_LEAST = 16, ORB_BAKE_MOST = 8192 /* texels a side */ };
 
 typedef struct orb_carry {
-  int32_t from; /* the shape */
+  int32_t from; /* the shape; of a texture: not the first one */
   orb_carry_what what;
   int32_t resolution; /* of a texture: texels a side, ORB_BAKE_LEAST to ORB_BAKE_MOST; 0: as fine as its own */
 } orb_carry;

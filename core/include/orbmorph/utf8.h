@@ -6,6 +6,7 @@
 #define ORBMORPH_UTF8_H
 
 #include <stddef.h>
+#include <string.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -27,6 +28,23 @@ static inline size_t orb_utf8_length(const unsigned char *p, size_t most) {
   int overlong = (c == 0xe0 && p[1] < 0xa0) || (c == 0xf0 && p[1] < 0x90);
   int beyond = (c == 0xed && p[1] > 0x9f) || (c == 0xf4 && p[1] > 0x8f);
   return overlong || beyond ? 0 : n;
+}
+
+/* Copies as many whole characters of a text as `size` bytes hold (≥ 1), with NUL at the end. A byte that is no
+ * character becomes U+FFFD. Returns the length. */
+static inline size_t orb_utf8_copy(char *out, size_t size, const char *text) {
+  size_t length = 0;
+  for (const unsigned char *p = (const unsigned char *)text; *p;) {
+    size_t from = orb_utf8_length(p, 4), n = from ? from : 3;
+    if (n >= size - length) {
+      break;
+    }
+    memcpy(out + length, from ? (const char *)p : "\xef\xbf\xbd", n);
+    length += n;
+    p += from ? from : 1;
+  }
+  out[length] = 0;
+  return length;
 }
 
 #ifdef __cplusplus

@@ -88,10 +88,13 @@ export class Daemon {
       child.once('exit', (code, signal) => fail(`exit ${code ?? signal}`));
       child.stdout.on('data', (chunk) => {
         this.out += chunk;
-        const line = /^orbmorphd (?:listening on (http:\/\/\S+)|works without a port)\n/m.exec(this.out);
+        const line =
+          /^orbmorphd (?:listening on (http:\/\/\S+)|works(?: without a port|; metrics on (http:\/\/\S+)))\n/m.exec(
+            this.out,
+          );
         if (line) {
           clearTimeout(timer);
-          resolve(line[1]);
+          resolve(line[1] ?? line[2]);
         }
       });
     });

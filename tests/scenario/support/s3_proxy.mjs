@@ -59,7 +59,11 @@ export async function s3Proxy(t, url, decide) {
     to.on('error', () => response.destroy());
     to.on('response', async (from) => {
       const chunks = [];
-      for await (const chunk of from) chunks.push(chunk);
+      try {
+        for await (const chunk of from) chunks.push(chunk);
+      } catch {
+        return response.destroy(); // the server went away
+      }
       answer(how, from, Buffer.concat(chunks), response);
     });
   });

@@ -1,4 +1,4 @@
-// An asset with what "transfer" gave it.
+// Shapes with texture coordinates, and an asset with what "transfer" gave it.
 import assert from 'node:assert/strict';
 import validator from 'gltf-validator';
 import { parseGlb } from './glb.mjs';
@@ -8,6 +8,26 @@ export const uploaded = async (d, bytes, query) => {
   assert.equal(reply.status, 201, JSON.stringify(reply.json));
   return { mesh: reply.json.id };
 };
+
+/** A shape as two charts, which meet where its sphere has x = 0. uvOf(v, east): of vertex v of the shape on a chart. */
+export function inCharts({ positions, points, triangles }, uvOf) {
+  const made = { positions: [], uv: [], triangles: [] };
+  const known = new Map();
+  for (const t of triangles) {
+    const east = t.reduce((sum, v) => sum + points[v][0], 0) > 0;
+    made.triangles.push(
+      t.map((v) => {
+        const key = `${v} ${east}`;
+        if (!known.has(key)) {
+          known.set(key, made.positions.push(positions[v]) - 1);
+          made.uv.push(uvOf(v, east));
+        }
+        return known.get(key);
+      }),
+    );
+  }
+  return made;
+}
 
 /** The asset of a supermesh: its document, and each primitive with its values read. Fails where the validator warns. */
 export async function assetOf(d, made) {

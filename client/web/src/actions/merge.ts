@@ -19,6 +19,7 @@ import {
   readyShapes,
   set,
   state,
+  takenFrom,
   tint,
   toast,
   type Matches,
@@ -44,6 +45,8 @@ export function buildRequest(find = false): SupermeshRequest {
   request.asset = { fit: find ? 'none' : options.fit };
   if (options.path !== 'linear') request.asset.path = options.path;
   if (options.holes !== 'reopen') request.asset.holes = options.holes;
+  const transfer = shapes.flatMap((shape, from) => takenFrom(shape).map((what) => ({ from, what })));
+  if (!find && transfer.length) request.transfer = transfer;
   return request;
 }
 
@@ -51,7 +54,8 @@ export function buildRequest(find = false): SupermeshRequest {
 function fastRequest(request: SupermeshRequest): SupermeshRequest | null {
   const method = request.align?.method;
   if (method === 'rbf' || method === 'rotate') return null;
-  return { ...request, align: { ...request.align, options: { preset: 'fast' } } };
+  const { transfer: _, ...bare } = request; // pictures would be baked twice
+  return { ...bare, align: { ...request.align, options: { preset: 'fast' } } };
 }
 
 export async function startMerge(purpose: Running['purpose'] = 'morph') {
@@ -253,17 +257,23 @@ export function cancelMerge() {
 
 /**
  * Shows a morph. `keep`: in place of the shown one, with its time, mixture and view. `signal`: if aborted meanwhile,
- * nothing changes. `matches`: those among which it is one; by default those that its answer lists.
+ * nothing changes. `matches`: those among which it is one; by default those that its answer lists. `look`: of its
+ * materials, see MorphData.
  */
 export async function openResult(
   supermesh: Supermesh,
   request: SupermeshRequest | null,
-  { keep = false, signal, matches }: { keep?: boolean; signal?: AbortSignal; matches?: Matches } = {},
+  {
+    keep = false,
+    signal,
+    matches,
+    look = 0,
+  }: { keep?: boolean; signal?: AbortSignal; matches?: Matches; look?: number } = {},
 ) {
   if (!keep) set({ loading: 'Loading the morph' });
   try {
     const buffer = await client.asset(supermesh.id, { signal });
-    const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length);
+    const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length, look);
     if (signal?.aborted) return;
     const { playing, mix, show, side, result: before } = state;
     const { time } = player;
@@ -284,7 +294,9 @@ export async function openResult(
         names: data.names,
         vertices: data.vertices,
         triangles: data.triangles,
+        looks: data.looks,
       },
+      look,
     };
     result.each.forEach((model, i) => {
       model.weights(result.data.shapes[i] ?? []);
@@ -293,7 +305,8 @@ export async function openResult(
     set({ result, mix: null });
     player.load(result);
     void tellOthers(result);
-    if (!isFast(result) && isOfPage(supermesh)) void listFound(foundIn(supermesh), () => state.result === result);
+    if (!isFast(result) && isOfPage(supermesh) && before?.supermesh.id !== supermesh.id)
+      void listFound(foundIn(supermesh), () => state.result === result);
     if (!keep) return;
     set({ show, side });
     player.seek(time);
@@ -302,6 +315,13 @@ export async function openResult(
   } finally {
     if (!keep) set({ loading: null });
   }
+}
+
+/** Shows the morph with other materials. */
+export async function showLook(look: number) {
+  const { result } = state;
+  if (result && look !== result.look)
+    await openResult(result.supermesh, result.request, { keep: true, matches: result.matches ?? undefined, look });
 }
 
 export function clearResult() {

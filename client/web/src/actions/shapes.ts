@@ -35,6 +35,7 @@ async function draw(shape: Shape, buffer: ArrayBuffer) {
     const model = shapeModel(display, tint(state.shapes.indexOf(shape)));
     patch(shape, {
       model,
+      extras: display.extras,
       facts: { vertices: display.vertices, triangles: display.triangles, format: display.format },
     });
   } catch {

@@ -19,6 +19,7 @@ export interface Display {
   edges: Uint32Array;
   /** its images are decoded later */
   skin?: Skin;
+  extras?: RawMesh['extras'];
 }
 
 export function frameOf(positions: ArrayLike<number>, used?: Uint32Array): Frame {
@@ -165,6 +166,7 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
     index,
     edges: edgesOf(index),
     skin,
+    extras: raw.extras,
   };
 }
 

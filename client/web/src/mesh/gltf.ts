@@ -19,9 +19,11 @@ interface Primitive {
   indices?: number;
   material?: number;
   targets?: Record<string, number>[];
+  extensions?: { KHR_materials_variants?: { mappings?: { material: number; variants: number[] }[] } };
 }
 interface Node {
   mesh?: number;
+  skin?: number;
   children?: number[];
   matrix?: number[];
   translation?: number[];
@@ -55,6 +57,7 @@ interface Document {
   nodes?: Node[];
   scenes?: { nodes?: number[] }[];
   scene?: number;
+  extensions?: { KHR_materials_variants?: { variants?: { name: string }[] } };
   animations?: {
     channels: { sampler: number; target: { node?: number; path: string } }[];
     samplers: { input: number; output: number; interpolation?: string }[];

@@ -5,6 +5,8 @@ import { edgesOf, smoothNormals, type Frame } from './geometry';
 
 export interface MorphData {
   names: string[];
+  /** the names of the variants of its materials, the first shape's own first; empty without variants */
+  looks: string[];
   vertices: number;
   triangles: number;
   frame: Frame;
@@ -99,10 +101,21 @@ function joinedIndex(parts: Moving[]): Uint32Array {
   return index;
 }
 
-/** Targets 0 … shapeCount − 2 are the other shapes; the rest are in-betweens of a curved path. */
-export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData {
+/** The parts with the materials of a variant. */
+const dressedAs = (parts: Moving[], look: number): Moving[] =>
+  parts.map((part) => {
+    const { mappings = [] } = part.primitive.extensions?.KHR_materials_variants ?? {};
+    const material = mappings.find(({ variants }) => variants.includes(look))?.material ?? part.primitive.material;
+    return { ...part, primitive: { ...part.primitive, material } };
+  });
+
+/**
+ * Targets 0 … shapeCount − 2 are the other shapes; the rest are in-betweens of a curved path, and those that came with
+ * the files. look: the variant of the materials.
+ */
+export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0): MorphData {
   const gltf = readGlb(buffer);
-  const parts = movingParts(gltf);
+  const parts = dressedAs(movingParts(gltf), look);
   if (!parts.length) throw new Error('The asset has no triangles.');
   const targetCount = (parts[0].primitive.targets?.length ?? 0) - parts[0].first;
   const position = joined(parts.map((p) => inScene(p.position, p.matrix, 1)));
@@ -138,6 +151,7 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData 
   for (const target of targets) for (let i = 0; i < position.length; i++) target.position[i] /= frame.radius;
   return {
     names,
+    looks: (gltf.json.extensions?.KHR_materials_variants?.variants ?? []).map(({ name }) => name),
     vertices: position.length / 3,
     triangles: index.length / 3,
     frame,

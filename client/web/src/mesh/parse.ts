@@ -4,6 +4,7 @@
  * triangle primitives one after another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
  */
 import { dressOf, plyDress, tried, type Dress } from './dress';
+import { extrasIn, type Extra } from './extras';
 import { readGlb, type Gltf } from './gltf';
 
 export interface RawMesh {
@@ -15,6 +16,8 @@ export interface RawMesh {
   /** other properties of PLY vertices, by name */
   properties?: Map<string, Float64Array>;
   dress?: Dress | null;
+  /** what a glTF file has besides its surface */
+  extras?: Extra[];
 }
 
 /** A growing typed array. */
@@ -409,7 +412,7 @@ function parseGltf(gltf: Gltf, format: string): RawMesh {
     for (let i = 0; i < part.index.length; i++) corners[c++] = part.index[i] + v;
     v += part.position.length / 3;
   }
-  return { format, positions, corners, dress: tried(() => dressOf(gltf, parts)) };
+  return { format, positions, corners, dress: tried(() => dressOf(gltf, parts)), extras: extrasIn(gltf, parts) };
 }
 
 /** Drops triangles that cannot be drawn because a vertex does not exist or is not finite. */

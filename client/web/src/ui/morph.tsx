@@ -3,7 +3,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import { isFast, isTemplate, isWaiting, presetOf, set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
 import { explain } from '../actions/token';
-import { measureErrors, measureStretch, STRETCHED } from '../actions/merge';
+import { measureErrors, measureStretch, showLook, STRETCHED } from '../actions/merge';
 import { player } from '../player';
 import { client } from '../state';
 import { Beside } from './beside';
@@ -250,6 +250,7 @@ export function MorphInspector() {
       {state.show === 'stretch' && <StretchLoader />}
       {state.show === 'error' && <ErrorLoader />}
       {(state.show === 'morph' || state.show === 'beside') && <Mix result={result} />}
+      <Looks result={result} />
       <div class="row wrap gap-top">
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>
@@ -320,6 +321,22 @@ export function MorphInspector() {
       </table>
       <OptionsFold />
     </>
+  );
+}
+
+/** The variants of the materials: the first shape's own, and the baked textures of others. */
+function Looks({ result: { data, look } }: { result: Result }) {
+  if (data.looks.length < 2) return null;
+  return (
+    <div class="field">
+      <span class="field-name">Look</span>
+      <Segments
+        label="Look"
+        value={String(look)}
+        onChange={(value) => void showLook(Number(value))}
+        items={data.looks.map((label, i) => ({ value: String(i), label }))}
+      />
+    </div>
   );
 }
 

@@ -1,5 +1,17 @@
 /** Shapes: the views side by side, the list with uploads and refusals, the options. */
-import { DEFAULTS, set, state, tint, type Options, type Shape } from '../state';
+import {
+  DEFAULTS,
+  extrasOf,
+  patch,
+  readyShapes,
+  set,
+  state,
+  takenFrom,
+  tint,
+  type Options,
+  type Shape,
+} from '../state';
+import type { Extra } from '../mesh/extras';
 import { addSamples, uploadAgain, moveShape, repairsFor, removeShape, sampleList } from '../actions/shapes';
 import { stage } from '../view/shared';
 import { Bar, Button, count, Field, Icon, Segments, Switch } from './parts';
@@ -72,6 +84,7 @@ export function ShapesInspector() {
         <Switch label="Wireframe" on={state.wire} onChange={(wire) => set({ wire })} />
       </div>
       <OwnMesh />
+      <Extras />
       <OptionsFold />
     </>
   );
@@ -103,6 +116,44 @@ function OwnMesh() {
         />
       )}
     </div>
+  );
+}
+
+const TAKE: Record<Extra, (name: string) => string> = {
+  skin: (name) => `Take the skin of ${name}`,
+  color: (name) => `Take the vertex colours of ${name}`,
+  texcoord: (name) => `Take the texture coordinates of ${name}`,
+  targets: (name) => `Take the morph targets of ${name}`,
+  texture: (name) => `Take the texture of ${name}, as a second look`,
+};
+
+/** Takes something from a shape, or leaves it. A morph has one skin: that of another shape is left. */
+function take(shape: Shape, what: Extra, on: boolean) {
+  for (const other of state.shapes)
+    if (other === shape || (on && what === 'skin'))
+      patch(other, { taken: (other.taken ?? []).filter((known) => known !== what) });
+  if (on) patch(shape, { taken: [...(shape.taken ?? []), what] });
+}
+
+/** What the morph can take from the later shapes besides their surfaces. */
+function Extras() {
+  const offers = readyShapes().flatMap((shape) => extrasOf(shape).map((what) => ({ shape, what })));
+  if (!offers.length) return null;
+  return (
+    <fieldset class="extras">
+      <legend>From the other shapes</legend>
+      {offers.map(({ shape, what }) => (
+        <label class="check" key={`${shape.key} ${what}`}>
+          <input
+            type="checkbox"
+            checked={takenFrom(shape).includes(what)}
+            onChange={(event) => take(shape, what, event.currentTarget.checked)}
+          />
+          <span>{TAKE[what](shape.name)}</span>
+        </label>
+      ))}
+      <p class="hint">The morph shows it on its own surface: each vertex gets what the shape has at the same place.</p>
+    </fieldset>
   );
 }
 

@@ -1,0 +1,153 @@
+// Throughput of small jobs with 1, 2 and 4 nodes that work, and what a job costs the database: the figures of docs/cluster.md.
+//
+//   tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/bench/scaling.mjs
+//
+// All nodes are on this machine, so each that works is held to a share of a core, ORB_SHARE (0.4): it is stopped for the rest of
+// every 100 ms, as the quota of a cgroup does. That says something only if the cores are not busy otherwise; the column "got" is
+// what the nodes really had, and says whether they waited for the database and S3 instead. ORB_JOBS (200) embeddings of
+// 20,480 triangles, a quarter of them for each ORB_LEVEL below 5, for each number of nodes, ORB_NODES (1,2,4). ORBMORPHD names the daemon.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { readdirSync, readFileSync } from 'node:fs';
+import { mkdtemp, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import { Daemon, until } from '../scenario/support/daemon.mjs';
+import * as shapes from '../scenario/support/shapes.mjs';
+
+const program = process.env.ORB_DAEMON;
+assert.ok(
+  program && process.env.ORB_POSTGRESQL && process.env.ORB_S3,
+  'to be run by with_postgresql.sh and with_s3.sh',
+);
+const share = Number(process.env.ORB_SHARE ?? 0.4);
+const jobs = Number(process.env.ORB_JOBS ?? 200);
+const level = Number(process.env.ORB_LEVEL ?? 5);
+const counts = (process.env.ORB_NODES ?? '1,2,4').split(',').map(Number);
+const PERIOD = 100; // ms
+const GOALS = new Map([
+  [2, 1.8],
+  [4, 3.4],
+]);
+
+/** A node and all below it: the processes of its jobs, whose time they give to their parent when they end. */
+function members(root) {
+  const below = new Map();
+  for (const pid of readdirSync('/proc').filter((name) => /^\d+$/.test(name))) {
+    try {
+      const fields = readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ').map(Number);
+      below.set(fields[1], [...(below.get(fields[1]) ?? []), { pid: Number(pid), ticks: fields.slice(11, 15) }]);
+    } catch {} // it has just ended
+  }
+  const all = [...below.values()].flat().filter(({ pid }) => pid === root);
+  for (let i = 0; i < all.length; i++) all.push(...(below.get(all[i].pid) ?? []));
+  return all;
+}
+
+/** Stops and continues a node in turn. */
+function hold(root) {
+  let timer;
+  const signal = (name) => {
+    for (const { pid } of members(root))
+      try {
+        process.kill(pid, name);
+      } catch {} // it has just ended
+  };
+  const run = () => {
+    signal('SIGCONT');
+    timer = setTimeout(stop, PERIOD * share);
+  };
+  const stop = () => {
+    signal('SIGSTOP');
+    timer = setTimeout(run, PERIOD * (1 - share));
+  };
+  run();
+  return () => {
+    clearTimeout(timer);
+    signal('SIGCONT');
+  };
+}
+
+/** Seconds of processor time that a node and its jobs have had. */
+function cpu(root) {
+  let ticks = 0;
+  for (const { ticks: own } of members(root)) for (const some of own) ticks += some;
+  return ticks / 100;
+}
+
+function sql(catalogue, text) {
+  return execFileSync('psql', ['-X', '-qAt', '-v', 'ON_ERROR_STOP=1', '-d', catalogue, '-c', text], {
+    encoding: 'utf8',
+  }).trim();
+}
+
+/** What the server has done so far: transactions, rows, bytes of WAL. */
+function cost(catalogue) {
+  const text = sql(
+    catalogue,
+    "SELECT pg_stat_force_next_flush(), xact_commit, tup_inserted+tup_updated+tup_deleted, pg_current_wal_lsn()-'0/0'" +
+      ' FROM pg_stat_database WHERE datname=current_database()',
+  );
+  return text.split('|').slice(1).map(Number);
+}
+
+async function measure(count) {
+  const name = `scaling${process.pid}-${count}`;
+  const catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
+  const shared = ['--catalogue', catalogue, '--objects', `s3://objects/${name}?endpoint=${process.env.ORB_S3}`];
+  const nodes = [];
+  const start = async (before, ...more) => {
+    const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-scaling-'));
+    const node = new Daemon(data, [...shared, '--scrub-rate', '0', '--log-format', 'text', ...more], {});
+    node.program = [...before, program];
+    nodes.push(node);
+    return node.start();
+  };
+  const releases = [];
+  try {
+    const serve = await start([], '--role', 'serve');
+    for (let i = 0; i < jobs; i++) {
+      const bump = ([x, y, z]) => [x * (1 + 0.3 * Math.sin(i)), y, z + 0.0001 * i];
+      const mesh = (await serve.upload(shapes.obj(shapes.ball(level, bump)))).json;
+      assert.equal((await serve.post('/v1/embeddings', { mesh: mesh.id })).status, 202);
+    }
+    const before = cost(catalogue);
+    const works = [];
+    for (let i = 0; i < count; i++) works.push(await start([], '--role', 'work', '--workers', '1'));
+    const roots = works.map(({ child }) => child.pid);
+    for (const root of roots) releases.push(hold(root));
+    const had = roots.map(cpu);
+    const ended = () => Number(sql(catalogue, 'SELECT count(*) FROM job WHERE state=2'));
+    const began = Date.now();
+    const first = ended();
+    await until(() => ended() === jobs, 'all jobs have ended', 3600);
+    const seconds = (Date.now() - began) / 1000;
+    const got = roots.map((root, i) => (cpu(root) - had[i]) / seconds);
+    const each = cost(catalogue).map((value, i) => (value - before[i]) / jobs);
+    return { rate: (jobs - first) / seconds, got, each };
+  } finally {
+    for (const release of releases) release();
+    for (const node of nodes) {
+      await node.stop();
+      await rm(node.data, { recursive: true, force: true });
+    }
+  }
+}
+
+console.log(
+  '| nodes | jobs a second | times one | got, of a core | transactions a job | rows a job | WAL a job |\n|---|---|---|---|---|---|---|',
+);
+let one;
+let missed = 0;
+for (const count of counts) {
+  const { rate, got, each } = await measure(count);
+  one ??= rate;
+  const times = rate / one;
+  missed += times < (GOALS.get(count) ?? 0);
+  const [transactions, rows, wal] = each.map((value) => value.toFixed(0));
+  const shares = got.map((value) => value.toFixed(2)).join(' ');
+  console.log(
+    `| ${count} | ${rate.toFixed(2)} | ${times.toFixed(2)} | ${shares} | ${transactions} | ${rows} | ${wal} B |`,
+  );
+}
+process.exitCode = missed ? 1 : 0;
