@@ -10,7 +10,9 @@ orb_test_packages=(
   libcmocka-dev clang-format openssl sqlite3 postgresql swift-proxy swift-account swift-container swift-object zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium nginx haproxy
 )
 orb_fuzz_packages=(clang libclang-rt-dev)
-orb_long_packages=(pgbouncer valgrind wrk blender caddy debootstrap lintian buildah podman runc prometheus systemd)
+orb_long_packages=(
+  pgbouncer valgrind wrk blender python3-numpy caddy debootstrap lintian buildah podman runc prometheus systemd
+)
 
 # Installs those of its arguments that are missing, as root or through sudo; never asks.
 orb_install_packages() {

@@ -2,8 +2,8 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash migrate cluster pgbouncer claims attacks deaths faults faults_asan soak load adversarial arm robust templates
-#   deploy blender visit
+#   tsan valgrind fuzz crash migrate cluster pgbouncer claims attacks deaths faults faults_asan soak load adversarial arm
+#   robust templates holes handles rigged deploy blender visit
 #
 # ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_ROUNDS (500) that of
 # rounds of chaos among several nodes, ORB_TEST_PATIENCE how many times longer than usual scenarios wait for what should
@@ -220,12 +220,37 @@ part_robust() {
   fi
 }
 
-# Each good mesh as a template: its vertices, corners and attributes must stay.
+# Each good mesh as a template: its vertices, corners and attributes must stay. Then every pair with its landmarks: the
+# target's vertices lie on the other shape, and the stated error is no less than an independent measure.
 part_templates() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
   cmake --build build
-  ORBMORPHD="$PWD/build/bin/orbmorphd" ORB_SHARED_MESHES=$(realpath "${ORB_MESHES:-../shared/meshes}") \
-    ORB_TEMPLATE_MOST=1000000 node --test tests/scenario/real_templates.test.mjs
+  ORBMORPHD="$PWD/build/bin/orbmorphd" ORB_SHARED_MESHES=$(realpath -m "${ORB_MESHES:-../shared/meshes}") \
+    ORB_TEMPLATE_MOST=1000000 node --test --test-reporter=spec tests/scenario/real_templates.test.mjs \
+    tests/long/template_pairs.test.mjs
+}
+
+# Every open mesh, generated and real, with every method: the rims come back.
+part_holes() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target orbmorphd
+  ORBMORPHD="$PWD/build/bin/orbmorphd" ORB_SHARED_MESHES=$(realpath -m "${ORB_MESHES:-../shared/meshes}") ORB_HOLES_ALL=1 \
+    node --test --test-reporter=spec tests/scenario/holes.test.mjs
+}
+
+# Spheres and scans with 1 to 50 handles and tunnels stitched in, and the time that closing them takes.
+part_handles() {
+  cmake --preset release -DORB_TESTS=ON -DORB_SHARED_MESHES="$(realpath -m "${ORB_MESHES:-../shared/meshes}")" >/dev/null
+  cmake --build build --target test_mesh_handles
+  ORB_HANDLES_ALL=1 build/bin/test_mesh_handles
+}
+
+# A rigged character with new shape keys in three.js, Babylon.js and Blender: build/rigged/rigged.png.
+part_rigged() {
+  cmake --preset release >/dev/null
+  cmake --build build --target orbmorphd
+  ORB_SHOTS=$PWD/build/rigged ORBMORPHD="$PWD/build/bin/orbmorphd" \
+    node --test --test-reporter=spec tests/long/rigged.test.mjs
 }
 
 # Behind nginx and Caddy, the unit's score, the dashboard's queries; as root also the package and the container.
@@ -238,8 +263,8 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash migrate cluster pgbouncer claims attacks deaths faults faults_asan soak load adversarial arm robust templates deploy \
-    blender visit
+  set -- tsan valgrind fuzz crash migrate cluster pgbouncer claims attacks deaths faults faults_asan soak load \
+    adversarial arm robust templates holes handles rigged deploy blender visit
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -175,6 +175,32 @@ static int64_t unflip(const orb_remesh_job *job, const given_mesh *given, orb_ne
   return flipped;
 }
 
+/* Names the landmarks at and within the triangles that stay flipped. */
+static orb_status refuse(orb_context *ctx, const orb_remesh_job *job, const orb_net *net, int64_t flipped) {
+  const orb_aligned_shape *shape = &job->shapes[0];
+  unsigned char *at = ORB_NEW0(ctx, unsigned char, shape->mesh.vertex_count);
+  if (!at) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t h = 0; h < 3 * shape->mesh.triangle_count; h++) {
+    at[shape->mesh.triangles[h]] |= (unsigned char)is_flipped(net, parent_of(shape, h / 3));
+  }
+  orb_status status = orb_fail(ctx, ORB_E_BAD_LANDMARKS,
+                               "The landmarks flip %lld %s of the first shape, and the method 'template' splits no "
+                               "triangle; move or drop one of the landmarks at them, or use the method 'adaptive'.",
+                               (long long)flipped, flipped == 1 ? "triangle" : "triangles");
+  orb_error *error = orb_context_error_edit(ctx);
+  error->shape = 0;
+  for (int32_t l = 0; l < job->landmark_count && error->landmark_count < ORB_ERROR_ITEMS; l++) {
+    int32_t v = shape->landmark_vertices[l];
+    if (v >= 0 && at[v]) {
+      error->landmarks[error->landmark_count++] = l;
+    }
+  }
+  orb_free(ctx, at);
+  return status;
+}
+
 /* The first shape is its own mesh: each vertex lies exactly at itself, and the distance is 0. */
 static void place_first(const orb_remesh_job *job, const given_mesh *given, int32_t *corner_of, orb_supermesh *out) {
   const orb_mesh *mesh = &job->shapes[0].mesh;
@@ -202,10 +228,7 @@ orb_status orb_remesh_template(orb_context *ctx, const orb_remesh_job *job, orb_
   }
   int64_t flipped = status == ORB_OK ? unflip(job, &given, &net) : 0;
   if (flipped > 0) {
-    status = orb_fail(ctx, ORB_E_UNSUPPORTED,
-                      "The landmarks flip %lld triangles of the first shape, which the method 'template' cannot split; "
-                      "place its landmarks at vertices, or use the method 'adaptive'.",
-                      (long long)flipped);
+    status = refuse(ctx, job, &net, flipped);
   }
   if (status == ORB_OK) {
     status = orb_placed_create_on(ctx, job, &net, &placed);

@@ -1,8 +1,9 @@
 // Real meshes as templates: vertices, their order, corners and attributes stay, bit for bit. The readers here are not
-// orbmorph's. ORB_TEMPLATE_MOST: the largest mesh, in triangles; tests/long.sh takes all of them.
+// orbmorph's, and the Khronos validator has nothing to say that it does not say of the upload. ORB_TEMPLATE_MOST: the largest mesh, in triangles; tests/long.sh takes all of them.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import test from 'node:test';
+import validator from 'gltf-validator';
 import { daemon } from './support/daemon.mjs';
 import { morphOf, parseGlb } from './support/glb.mjs';
 import * as real from './support/real.mjs';
@@ -84,6 +85,12 @@ function readGlb(bytes) {
   return { positions, corners: [...read(indices)], kept };
 }
 
+/** Errors and warnings of the Khronos validator. */
+async function complaints(glb) {
+  const { issues } = await validator.validateBytes(new Uint8Array(glb), { maxIssues: 1000 });
+  return issues.messages.filter((m) => m.severity < 2).map((m) => `${m.code} at ${m.pointer}`);
+}
+
 const readers = {
   glb: readGlb,
   obj: (bytes) => readObj(bytes.toString()),
@@ -106,7 +113,13 @@ for (const row of real.rows('good').filter((one) => Number(one.f) <= most))
       remesh: { method: 'template' },
       asset: { fit: 'none' },
     });
-    const { shapes: at, deltas, triangles, gltf, read, count } = morphOf((await d.get(made.asset)).bytes);
+    const asset = (await d.get(made.asset)).bytes;
+    const known = row.format === 'glb' ? await complaints(bytes) : [];
+    assert.deepEqual(
+      (await complaints(asset)).filter((one) => !known.includes(one)),
+      [],
+    );
+    const { shapes: at, deltas, triangles, gltf, read, count } = morphOf(asset);
     assert.equal(gltf.meshes[0].primitives.length, 1);
     const { attributes } = gltf.meshes[0].primitives[0];
     const own = file.positions.length;

@@ -260,3 +260,28 @@ test('where the template is too coarse for a shape, its triangles are named, the
     assert.ok(list.every((shape) => !('coarse' in shape)));
   }
 });
+
+test('landmarks that turn a triangle over are named', async (t) => {
+  const d = await daemon(t);
+  const [base, target] = [shapes.egg(3), shapes.bean(3)];
+  const list = [];
+  for (const body of [base, target]) list.push({ mesh: (await d.upload(shapes.obj(body))).json.id });
+  const [a, b, c] = base.triangles[100];
+  const mark = (name, ...at) => ({ name, at: at.map((vertex) => ({ vertex })) });
+  const tips = [0, 1, 2, 3, 4, 5].map((v) => mark(`tip ${v}`, v, v));
+  const mirrored = [mark('a', a, a), mark('b', b, c), mark('c', c, b)];
+  const request = (landmarks, method = 'template') => ({
+    shapes: list,
+    landmarks,
+    align: { method: 'rbf' },
+    remesh: { method },
+    asset: { fit: 'none' },
+  });
+  const { problem } = await d.make('/v1/supermeshes', request([...tips, ...mirrored]));
+  assert.equal(problem.type, '/problems/bad-landmarks');
+  assert.deepEqual(problem.landmarks, [6, 7, 8]);
+  assert.equal(problem.shape, 0);
+  assert.match(problem.detail, /flip 1 triangle of/);
+  await d.made('/v1/supermeshes', request([...tips, ...mirrored.slice(0, 2)]));
+  await d.made('/v1/supermeshes', request([...tips, ...mirrored], 'adaptive'));
+});

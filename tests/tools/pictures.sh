@@ -4,6 +4,7 @@
 #   docs/studio.png                    the studio, in Chromium
 #   docs/tutorial.png, tutorial-sheet  the tutorial's page in Chromium and its sheet (they need tests/node_modules)
 #   docs/holes-open.png, holes-filled  half an elephant, open and filled
+# docs/rigged.png is the sheet of tests/long.sh rigged.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
 bin=$PWD/build/bin

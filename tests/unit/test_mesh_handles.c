@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 
@@ -15,6 +16,7 @@
 #include "support_context.h"
 #include "support_handles.h"
 #include "support_shapes.h"
+#include "support_shared.h"
 
 static orb_mesh read_text(char *text, size_t size) {
   orb_mesh mesh;
@@ -118,8 +120,9 @@ static void check_faces_stay(const orb_mesh *raw, const orb_mesh *mesh) {
   assert_int_equal(kept, raw->triangle_count);
 }
 
-/* tell: whether the body is so thick that tubes do not pierce it, and `filled` says on which side of it a loop lies. */
-static void close_all(orb_mesh *plain, int count, unsigned seed, double size, int tell) {
+/* tell: whether the body is so thick that tubes do not pierce it, and `filled` says on which side of it a loop lies.
+ * Returns the processor time that closing took, in seconds. */
+static double close_all(orb_mesh *plain, int count, unsigned seed, double size, int tell) {
   size_t length;
   int made;
   char *text = handles_stitch(plain, count, seed, &length, &made);
@@ -132,7 +135,9 @@ static void close_all(orb_mesh *plain, int count, unsigned seed, double size, in
   assert_true(topology.genus == count);
   orb_mesh_extent(&raw, &extent);
   const orb_repair_options options = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = size};
+  clock_t start = clock();
   assert_int_equal(orb_mesh_repair_with(ctx, &mesh, &options), ORB_OK);
+  double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;
   assert_int_equal(orb_mesh_topology(ctx, &mesh, &topology), ORB_OK);
   assert_true(topology.genus == 0 && topology.components == 1 && topology.boundary_loops == 0);
   assert_true(topology.nonmanifold_edges == 0 && topology.nonmanifold_vertices == 0 && topology.consistent);
@@ -167,6 +172,7 @@ static void close_all(orb_mesh *plain, int count, unsigned seed, double size, in
   assert_true(fabs(changed - made_area) < 1e-12 * extent.diagonal * extent.diagonal);
   orb_mesh_free(ctx, &mesh);
   orb_mesh_free(ctx, &raw);
+  return seconds;
 }
 
 static void test_spheres(void **state) {
@@ -196,6 +202,15 @@ static void test_animals(void **state) {
     orb_mesh mesh;
     assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, &mesh, NULL), ORB_OK);
     close_all(&mesh, 4 + i, 3, 0.2, 0);
+    for (int count = 1; getenv("ORB_HANDLES_ALL") && count <= 50; count++) {
+      int made;
+      free(handles_stitch(&mesh, count, 3, &size, &made));
+      if (made < count) {
+        print_message("%s has room for %d handles\n", names[i], made);
+        break;
+      }
+      close_all(&mesh, count, 3, 0.2, 0);
+    }
     orb_mesh_free(ctx, &mesh);
   }
 }
@@ -214,6 +229,59 @@ static void check_refused(orb_mesh *mesh, const orb_repair_options *options, int
   orb_mesh_free(ctx, mesh);
 }
 
+/* Real scans, where their folder is there. ORB_HANDLES_ALL=1: every number of handles up to 50, as tests/long.sh does,
+ * and the processor time of large meshes. */
+static void test_scans(void **state) {
+  (void)state;
+  int all = getenv("ORB_HANDLES_ALL") != NULL;
+  static const char *const names[] = {"armadillo_29k.obj", "armadillo_86k.obj", "nefertiti_280k.ply"};
+  for (int i = 0; i < (all ? 3 : 1); i++) {
+    orb_mesh scan;
+    if (!shared_mesh(ctx, names[i], &scan)) {
+      skip();
+    }
+    for (int count = i < 2 ? 1 : 20; count <= (i < 2 ? 50 : 20); count += all ? 1 : 49) {
+      double seconds = close_all(&scan, count, 5 + (unsigned)count, 0.2, 0);
+      if (all) {
+        print_message("%s, %d triangles, %d handles: %.2f s\n", names[i], scan.triangle_count, count, seconds);
+      }
+    }
+    orb_mesh_free(ctx, &scan);
+  }
+  for (int count = 1; all && count <= 50; count++) {
+    orb_mesh ball = shape_ball(ctx, 6);
+    close_all(&ball, count, (unsigned)count, 0, 1);
+    shape_free(ctx, &ball);
+  }
+  if (all) {
+    orb_mesh ball = shape_ball(ctx, 8);
+    double seconds = close_all(&ball, 20, 1, 0, 1);
+    print_message("a ball, %d triangles, 20 handles: %.2f s\n", ball.triangle_count, seconds);
+    shape_free(ctx, &ball);
+  }
+}
+
+/* The genus is that of index.csv, which another program computed. */
+static void test_real_refused(void **state) {
+  (void)state;
+  static const struct {
+    const char *name;
+    int genus;
+  } cases[] = {{"torus.obj", 1}, {"double_torus.obj", 2}, {"three_holes.off", 3}};
+  for (size_t i = 0; i < 2 * sizeof cases / sizeof *cases; i++) {
+    const orb_repair_options options = {.repair = i % 2 ? ORB_REPAIR_CLOSE_HANDLES : ORB_REPAIR_SAFE};
+    size_t size;
+    unsigned char *bytes = shared_bytes("bad", cases[i / 2].name, &size);
+    if (!bytes) {
+      skip();
+    }
+    orb_mesh mesh;
+    assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, &mesh, NULL), ORB_OK);
+    free(bytes);
+    check_refused(&mesh, &options, cases[i / 2].genus);
+  }
+}
+
 static orb_mesh torus(int n, double thin) {
   char *text = malloc((size_t)(n * n) * 100), *p = text;
   for (int i = 0; i < n * n; i++) {
@@ -229,15 +297,17 @@ static orb_mesh torus(int n, double thin) {
 
 static void test_refused(void **state) {
   (void)state;
-  const orb_repair_options safe = {.repair = ORB_REPAIR_SAFE}, close = {.repair = ORB_REPAIR_CLOSE_HANDLES};
+  const orb_repair_options safe = {.repair = ORB_REPAIR_SAFE},
+                           close = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = 0.01};
   for (int i = 0; i < 2; i++) {
     orb_mesh ring = torus(24, 1);
     check_refused(&ring, i ? &close : &safe, 1);
     size_t size;
-    for (int holes = 1; holes <= 5; holes += 2) {
-      char *text = handles_plate(holes, &size);
+    static const int holes[] = {1, 3, 5, 60};
+    for (int k = 0; k < 4; k++) {
+      char *text = handles_plate(holes[k], &size);
       orb_mesh plate = read_text(text, size);
-      check_refused(&plate, i ? &close : &safe, holes);
+      check_refused(&plate, i ? &close : &safe, holes[k]);
     }
   }
   assert_non_null(strstr(orb_context_error(ctx)->detail, "handle_size"));
@@ -316,6 +386,7 @@ static void test_memory(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals),
                                      cmocka_unit_test(test_refused), cmocka_unit_test(test_torus),
-                                     cmocka_unit_test(test_mixed),   cmocka_unit_test(test_memory)};
+                                     cmocka_unit_test(test_mixed),   cmocka_unit_test(test_memory),
+                                     cmocka_unit_test(test_scans),   cmocka_unit_test(test_real_refused)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

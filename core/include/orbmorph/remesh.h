@@ -57,7 +57,8 @@ typedef struct orb_supermesh {
  * is exactly that corner. overlay, subdivision and convex-hull keep all input vertices; adaptive keeps the landmarks.
  * convex-hull is the baseline of Peng & Timalsena 2016, Fig. 11: the Delaunay triangulation of all vertices, at most 4
  * million; its error is proved but not controlled. options NULL: defaults. Errors: ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED,
- * ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED. Stage "remesh". */
+ * ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED; template: ORB_E_BAD_LANDMARKS where landmarks turn a triangle over. Stage
+ * "remesh". */
 ORB_API ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
                                              int32_t landmark_count, const orb_remesh_options *options,
                                              orb_supermesh *out);
