@@ -76,14 +76,13 @@ build() {
   [ -f "$root/build/build.ninja" ] || cmake -S "$root" --preset release -DORB_TESTS=OFF
   cmake --build "$root/build" --target orbmorphd orbmorph
 }
-# What the build does, every few seconds: Ninja writes [done/all] before each step.
+# What the build does, every five seconds: Ninja writes [done/all] before each step.
 say_progress() {
-  local step last=
+  local step
   while sleep 5; do
     step=$(grep -aoE '^\[[0-9]+/[0-9]+\]' "$log" | tail -n 1 | tr -d '[]') || true
     [ -n "$step" ] || step='preparing'
-    [ "$step" = "$last" ] || echo "  building: ${step/\// of } (${SECONDS} s)"
-    last=$step
+    echo "  building: ${step/\// of } (${SECONDS} s)"
   done
 }
 say_progress &

@@ -80,6 +80,31 @@ test('the default morph replaces the fast one and keeps time, camera and view', 
   await done();
 });
 
+test('the default job is sent when the fast one has ended, not to compute beside it', async () => {
+  const job = { id: '2'.repeat(32), url: `/v1/jobs/${'2'.repeat(32)}`, kind: 'supermesh', state: 'running' };
+  Object.assign(job, { stage: 'align', progress: 0.4, result: null, problem: null, attempt: 1 });
+  let ended = false;
+  const { page, posted, done } = await pageWith((kind, route) =>
+    kind === 'fast'
+      ? route.fulfill({ status: 202, headers: { Location: job.url }, json: job })
+      : refuse(route, 'No default morph'),
+  );
+  await page.route(`**${job.url}**`, (route) =>
+    route.request().url().endsWith('/events')
+      ? route.fulfill({ contentType: 'text/event-stream', body: `event: progress\ndata: ${JSON.stringify(job)}\n\n` })
+      : route.fulfill({ json: { ...job, state: ended ? 'cancelled' : 'running' } }),
+  );
+  await button(page, /^Morph 2 shapes$/).click();
+  const polled = () => page.waitForRequest((request) => request.url().endsWith('/events'));
+  await polled();
+  await polled();
+  assert.deepEqual(posted, ['fast']);
+  ended = true;
+  await page.getByRole('alert').getByText('No default morph').waitFor();
+  assert.deepEqual(posted, ['fast', 'default']);
+  await done();
+});
+
 test('a fast morph that fails does not hide the default one', async () => {
   const { page, posted, done } = await pageWith((kind, route) =>
     kind === 'fast' ? refuse(route, 'No fast morph') : route.continue(),
