@@ -78,29 +78,34 @@ static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, 
              : orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
 }
 
+/* Is a copy too coarse for what its whole shape can do? */
+static int is_of_copy(orb_status status) {
+  return status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED;
+}
+
 /* Aligns copies of the later shapes, and lets the shapes follow. *lifted 0: the whole shapes are to be aligned, since
- * the copies do not meet at the landmarks, or a shape cannot follow its copy. `out` is then empty. */
+ * the copies do not meet at the landmarks or are not certified, or a shape cannot follow its copy. `out` is then empty.
+ */
 static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                                orb_alignment *out, int *lifted) {
   const orb_map_params params = orb_map_params_of(options->preset);
-  const int32_t each = params.level.kept_each * landmark_count;
-  const int32_t keep_until = landmark_count == 0 ? 4 : each > params.level.kept ? each : params.level.kept;
+  const int32_t keep_until = orb_map_keep_until(&params, landmark_count);
   const int32_t size = 2 * keep_until > params.copies.size ? 2 * keep_until : params.copies.size;
   orb_copies copies;
-  orb_status status;
   *lifted = 0;
-  ORB_GO(status, orb_copies_create(ctx, shapes, shape_count, landmarks, landmark_count, size, keep_until, &copies),
-         end);
-  status = align_shapes(ctx, copies.shapes, shape_count, copies.landmarks, landmark_count, options, out);
-  if (status == ORB_E_BAD_LANDMARKS) {
-    orb_error_clear(ctx);
-    status = ORB_OK;
-  } else if (status == ORB_OK) {
+  orb_status status = orb_copies_create(ctx, shapes, shape_count, landmarks, landmark_count, size, keep_until, &copies);
+  if (status == ORB_OK) {
+    status = align_shapes(ctx, copies.shapes, shape_count, copies.landmarks, landmark_count, options, out);
+  }
+  if (status == ORB_OK) {
     status = orb_align_lift(ctx, &copies, landmarks, options->preset, out, lifted);
   }
-end:
   orb_copies_free(ctx, &copies);
+  if (is_of_copy(status)) {
+    orb_error_clear(ctx);
+    return ORB_OK;
+  }
   return status;
 }
 

@@ -91,8 +91,9 @@ job *schedule_choose(queue *q, queue_lane lane) {
     if (j->row.suspect && may_pass) {
       continue;
     }
-    if (j->row.suspect) {
-      return q->running - (q->isolated ? q->guests : 0) == 0 && mine ? j : NULL;
+    if (j->row.suspect) { /* alone, so not beside others as a guest */
+      const int alone = q->running - (q->isolated ? q->guests : 0) == 0;
+      return alone && mine && lane != QUEUE_GUESTS ? j : NULL;
     }
     if (!mine || (fetches(j) ? q->owners[j->owner].fetching >= QUEUE_FETCHES_OF_OWNER : !admits(q, lane, j, kept))) {
       continue;

@@ -202,6 +202,21 @@ typedef struct noted {
   int ms, *next, at;
 } noted;
 
+/* Without isolation a suspect is alone, and is no guest: as a guest it would keep all others out after its end. */
+static void test_a_suspect_is_no_guest(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 2);
+  submit(s, q, "suspect", SMALL);
+  submit(s, q, "small", SMALL);
+  q->first->row.suspect = 1;
+  pthread_mutex_lock(&q->lock);
+  assert_null(schedule_choose(q, QUEUE_GUESTS));
+  pthread_mutex_unlock(&q->lock);
+  end_after(q, take(q, "suspect"), 0);
+  end_after(q, take(q, "small"), 0);
+  queue_destroy(q);
+}
+
 static void sleep_ms(int ms) {
   nanosleep(&(struct timespec){.tv_nsec = ms * 1000000L}, NULL);
 }
@@ -356,6 +371,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_pauses_earn_nothing, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_given_back, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_guests_pass_a_suspect, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_a_suspect_is_no_guest, stored_setup, stored_teardown),
       cmocka_unit_test(test_tasks_take_turns),
       cmocka_unit_test(test_tasks_share_memory),
       cmocka_unit_test(test_memory_of_files),

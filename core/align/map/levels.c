@@ -39,9 +39,7 @@ orb_status orb_map_levels_prepare(orb_map_run *c) {
   for (int32_t i = 0; i < c->pairs.count; i++) {
     memcpy(c->start + 3 * (size_t)c->pairs.moving[i], c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
   }
-  const int32_t held = c->pairs.count + c->springs.count;
-  int32_t kept = c->params.level.kept_each * held;
-  int32_t keep_until = held ? (kept > c->params.level.kept ? kept : c->params.level.kept) : 4;
+  const int32_t keep_until = orb_map_keep_until(&c->params, c->pairs.count + c->springs.count);
   ORB_TRY(orb_hierarchy_create(c->ctx, &c->moving->mesh, c->keep, keep_until, &hierarchy));
   take(c, hierarchy);
   return ORB_OK;

@@ -156,3 +156,8 @@ orb_map_params orb_map_params_of(orb_preset preset) {
   }
   return p;
 }
+
+int32_t orb_map_keep_until(const orb_map_params *params, int32_t held) {
+  const int32_t kept = params->level.kept_each * held;
+  return held == 0 ? 4 : kept > params->level.kept ? kept : params->level.kept;
+}

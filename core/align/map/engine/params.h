@@ -305,5 +305,7 @@ typedef struct orb_map_params {
 
 /* The values for a preset. `fast` composes no map; where a coarse copy is composed it has the values of `default`. */
 orb_map_params orb_map_params_of(orb_preset preset);
+/* Vertices of the coarsest level of a map that `held` landmarks hold. */
+int32_t orb_map_keep_until(const orb_map_params *params, int32_t held);
 
 #endif
