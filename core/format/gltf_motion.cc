@@ -18,7 +18,8 @@ struct Motion {
   const Numbers &shift;
   Editor *editor;
   std::map<int64_t, std::pair<int64_t, size_t>> times;        /* of an accessor: its copy, and how many keys it has */
-  std::map<std::tuple<int64_t, bool, int64_t>, int64_t> keys; /* of an accessor, by spline and node if it is shifted */
+  /* Of an accessor, by what it is read as: spline, keys, width, and node if it is shifted. */
+  std::map<std::tuple<int64_t, bool, size_t, size_t, int64_t>, int64_t> keys;
 
   Floats floats_of(const Numbers &values) const {
     Floats out{Charged<float>(from.ctx)};
@@ -46,7 +47,7 @@ struct Motion {
     for (size_t k = 0; width == 3 && node != NONE && k < 3; k++) {
       is_shifted = is_shifted || shift[3 * static_cast<size_t>(node) + k] != 0;
     }
-    auto key = std::make_tuple(accessor, is_spline, is_shifted ? node : NONE);
+    auto key = std::make_tuple(accessor, is_spline, count, width, is_shifted ? node : NONE);
     auto found = keys.find(key);
     if (found == keys.end()) {
       size_t has = 0;

@@ -85,8 +85,7 @@ static orb_status png_rows(orb_context *ctx, png_structp png, png_infop info, pn
       png_read_row(png, out->rgba + 4 * (size_t)out->width * y, NULL);
     }
   }
-  png_read_end(png, NULL);
-  return ORB_OK;
+  return ORB_OK; /* whatever follows the last row does not matter, as to other programs */
 }
 
 static orb_status decode_png(orb_context *ctx, const unsigned char *bytes, size_t size, orb_pixels *out) {

@@ -148,7 +148,7 @@ static store_result end_surely(queue *q, job *j, job_end *end, const queue_made 
   store_result stored = end_job(q, j, end, 1);
   for (int lost = 0; q->shared;) {
     int again = stored == STORE_ERROR  ? shared_pause(q)
-                : stored == STORE_LOST ? made && lost++ < LOST_TRIES && made->published(made->user)
+                : stored == STORE_LOST ? made && lost++ < LOST_TRIES && shared_pause(q) && made->published(made->user)
                                        : 0;
     if (!again) {
       break;

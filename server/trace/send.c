@@ -190,7 +190,8 @@ static void *thread_main(void *argument) {
     curl_multi_perform(sender.multi, &running);
     collect();
     now = orb_clock_ms();
-    int64_t wait = sender.flies ? BATCH_MS : (next > sender.again_at ? next : sender.again_at) - now;
+    const int64_t begins = waiting() >= BATCH || sender.again_at > next ? sender.again_at : next;
+    int64_t wait = sender.flies ? BATCH_MS : begins - now;
     wait = wait < 1 ? (waiting() + sender.batch ? 0 : BATCH_MS) : wait < BATCH_MS ? wait : BATCH_MS;
     curl_multi_poll(sender.multi, NULL, 0, (int)wait, NULL);
   }

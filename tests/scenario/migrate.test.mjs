@@ -331,7 +331,7 @@ test('a target of others, a schema of the future and wrong options are refused, 
   await refused(migrate(from, fresh('x2', null, cluster.objects)), /bucket of the target belongs to another/);
   await refused(migrate(cluster, fresh('x3', null, cluster.objects)), /bucket of the target is that of the source/);
   await refused(migrate(from, fresh('x4', null, `s3://nowhere?endpoint=${bucket}`)), /bucket nowhere does not exist/);
-  await refused(migrate(from, from), /source, too/);
+  await refused(migrate(from, from), /also the data folder of the source/);
   await refused(migrate({ from: ['--from-data', path.join(top, 'none')] }, fresh('x5')), /none is not a data folder/);
   mkdirSync(path.join(top, 'empty'));
   await refused(migrate({ from: ['--from-data', path.join(top, 'empty')] }, fresh('x5')), /empty is not a data folder/);

@@ -77,7 +77,7 @@ export const startBrowser = ({ compositing = 'software' } = {}) =>
   });
 
 /**
- * At most four frames a second on the page's main thread. What moves there draws as often as it gets frames, and software
+ * At most eight frames a second on the page's main thread. What moves there draws as often as it gets frames, and software
  * GL takes a core for each of them as long as the test lasts.
  */
 function slowFrames() {
@@ -87,7 +87,7 @@ function slowFrames() {
   globalThis.requestAnimationFrame = (call) => {
     const id = ++count;
     const draw = () => waiting.set(id, { frame: request((time) => waiting.delete(id) && call(time)) });
-    waiting.set(id, { timer: setTimeout(draw, 250) });
+    waiting.set(id, { timer: setTimeout(draw, 120) });
     return id;
   };
   globalThis.cancelAnimationFrame = (id) => {

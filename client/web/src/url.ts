@@ -1,8 +1,8 @@
 /**
  * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
- * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), q: the best match, which of its
- * matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
+ * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), go=1: the job is sent once the fast
+ * one is computed, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
  * cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: the variant of its materials.
  */
 import type { Place } from 'orbmorph';
@@ -23,7 +23,7 @@ import {
 import { EXTRAS } from './mesh/extras';
 import { addFromServer } from './actions/shapes';
 import { takeLandmarks } from './actions/landmarks';
-import { matchesOf, openResult, resumeJob } from './actions/merge';
+import { matchesOf, openResult, resumeJob, startMerge } from './actions/merge';
 import { setPaint } from './actions/spheres';
 import { openSupermesh } from './actions/server';
 import { player } from './player';
@@ -113,6 +113,7 @@ function encode(): string {
   put('r', state.result?.supermesh.id ?? '');
   put('j', state.running?.job?.id ?? '');
   if (state.running?.job && state.running.purpose === 'find') put('find', '1');
+  if (state.running?.fast && !state.running.job) put('go', '1');
   put('q', encodeMatch());
   if (state.result && !state.playing) put('t', player.time.toFixed(3));
   put(
@@ -236,6 +237,7 @@ export async function restore() {
   }
   const job = query.get('j');
   if (job) void resumeJob(job, query.get('find') ? 'find' : 'morph', next);
+  else if (query.get('go')) void startMerge();
 }
 
 /** Keeps the URL up to date. Pasting a URL of another state reloads the page with that state. */

@@ -318,15 +318,30 @@ export async function openResult(
   }
 }
 
-/** Shows the morph with other materials. */
+let looking = new AbortController();
+
+/** Shows the morph with other materials. The last call wins, and none outlives its morph. */
 export async function showLook(look: number) {
   const { result } = state;
-  if (result && look !== result.look)
-    await openResult(result.supermesh, result.request, { keep: true, matches: result.matches ?? undefined, look });
+  looking.abort();
+  looking = new AbortController();
+  const { signal } = looking;
+  if (!result || look === result.look) return;
+  try {
+    await openResult(result.supermesh, result.request, {
+      keep: true,
+      signal,
+      matches: result.matches ?? undefined,
+      look,
+    });
+  } catch (error) {
+    if (!signal.aborted) toast(explain(error), 'error');
+  }
 }
 
 export function clearResult() {
   const { result } = state;
+  looking.abort();
   if (!result) return;
   player.unload();
   for (const model of [result.main, ...result.each, ...(result.stretch ?? [])]) model.dispose();
