@@ -17,7 +17,7 @@ struct Motion {
   const Indices &number;
   const Numbers &shift;
   Editor *editor;
-  std::map<int64_t, std::pair<int64_t, size_t>> times;        /* of an accessor: its copy, and how many keys it has */
+  std::map<int64_t, std::pair<int64_t, size_t>> times; /* of an accessor: its copy, and how many keys it has */
   /* Of an accessor, by what it is read as: spline, keys, width, and node if it is shifted. */
   std::map<std::tuple<int64_t, bool, size_t, size_t, int64_t>, int64_t> keys;
 
