@@ -32,7 +32,9 @@ static const double ORB_FIND_SPECTRAL_BEHIND = 0.8;
  * differ by a factor of 1.5 where the map is right. */
 static const double ORB_FIND_BEHIND = 2;
 /* The energy of the map of the best match above which the next best match is tried as well, unless that bends so many
- * times as much; and the share of the energy that its map may have at most, where it is taken in its place. */
+ * times as much; and the share of the energy that its map may have at most, where it is taken in its place. Nine
+ * in ten right maps of two people have at most 1.3. Of dan-neutral and dan-twist the right match bends 3.2 times as
+ * much as the wrong one, and its map has 0.88 of the energy; the margin is between that and none. */
 static const double ORB_FIND_OTHER_ABOVE = 1.25, ORB_FIND_OTHER_BEHIND = 4, ORB_FIND_OTHER_GAIN = 0.95;
 /* What `clear` is where all other maps are the same. */
 static const double ORB_FIND_CLEAR_ALONE = 0.5;
