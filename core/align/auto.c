@@ -1,6 +1,6 @@
 /* Alignment without landmarks.
  *
- * Every later shape is matched with the first one (find/match.c), and the composed map goes to the targets of its
+ * The shapes are embedded anew, on spheres that keep angles. Every later shape is matched with the first one (find/match.c), and the composed map goes to the targets of its
  * match. Where that leads to no good map, pairs of the matches are pinned as landmarks, and the map is composed with
  * them held and then without them. Where that leads to none of two shapes either, samples of the match guide landmark
  * walks. The alignment of least energy is returned. The preset `fast` searches for rotations of the spheres only.
@@ -15,6 +15,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "embed/newton/newton.h"
 
 enum { LEAST_PAIRS = 3 };            /* that are pinned: two leave a rotation open */
 static const double MOST_COST = 1e9; /* of an alternative, where the best rough map does not bend the shapes at all */
@@ -361,23 +362,72 @@ static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shap
   return write_alternatives(ctx, shapes, m, out);
 }
 
-orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                          const orb_align_options *options, orb_alignment *out) {
+static void spheres_free(orb_context *ctx, double **points, int32_t shape_count) {
+  for (int32_t s = 0; points && s < shape_count; s++) {
+    orb_free(ctx, points[s]);
+  }
+  orb_free(ctx, points);
+}
+
+/* Embeds the shapes anew with the energy of angles. The given embeddings keep areas, which stretches limbs on the sphere
+ * six times as much around as along: a straight edge of one shape then cuts off so much of an arc of the other that one
+ * triangle in twelve flips where the shapes lie on each other. Angles leave half of these flips. *points: what `even`
+ * refers to; the caller frees it. A sphere that is not certified leaves the given one. */
+static orb_status make_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, orb_align_shape *even,
+                            double **points) {
+  for (int32_t s = 0; s < shape_count; s++) {
+    const orb_mesh *mesh = shapes[s].mesh;
+    orb_certificate certificate;
+    even[s] = shapes[s];
+    points[s] = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
+    if (!points[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+    ORB_TRY(orb_newton_run_angles(ctx, mesh, points[s]));
+    ORB_TRY(
+        orb_certify(ctx, points[s], mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate));
+    if (certificate.valid) {
+      even[s].points = points[s];
+    }
+  }
+  return ORB_OK;
+}
+
+static orb_status align_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                             const orb_align_options *options, orb_alignment *out) {
   matches m = {.clear = 1};
   orb_align_options rotated = *options;
   rotated.preset = ORB_PRESET_FAST;
   ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
   orb_status status = ORB_OK;
   out->match.clear = 1;
-  if (options->preset != ORB_PRESET_FAST) {
-    ORB_GO(status, find_matches(ctx, shapes, shape_count, &m), end);
-    ORB_GO(status, follow_matches(ctx, shapes, &m, options, out), end);
-    status = describe_matches(ctx, shapes, &m, out);
-  }
+  ORB_GO(status, find_matches(ctx, shapes, shape_count, &m), end);
+  ORB_GO(status, follow_matches(ctx, shapes, &m, options, out), end);
+  status = describe_matches(ctx, shapes, &m, out);
 end:
   matches_free(ctx, &m);
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
   }
+  return status;
+}
+
+orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                          const orb_align_options *options, orb_alignment *out) {
+  if (options->preset == ORB_PRESET_FAST) {
+    ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, options, out));
+    out->match.clear = 1;
+    return ORB_OK;
+  }
+  orb_align_shape *even = ORB_NEW(ctx, orb_align_shape, shape_count);
+  double **points = ORB_NEW0(ctx, double *, shape_count);
+  orb_status status = even && points ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    ORB_GO(status, make_even(ctx, shapes, shape_count, even, points), end);
+    status = align_even(ctx, even, shape_count, options, out);
+  }
+end:
+  spheres_free(ctx, points, shape_count);
+  orb_free(ctx, even);
   return status;
 }

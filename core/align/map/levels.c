@@ -167,7 +167,7 @@ orb_status orb_map_level_place(orb_map_run *c, orb_refiner *r, orb_map_start sta
   orb_map_level_free(c->ctx, l);
   ORB_TRY(orb_map_level_create(c->ctx, &c->params, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live,
                                c->local, l));
-  orb_map_place(c, l, to_mesh, start);
+  ORB_TRY(orb_map_place(c, l, to_mesh, start));
   orb_map_set_pull(c, l, to_mesh, start == ORB_MAP_SPATIAL ? 1 : 0);
   return ORB_OK;
 }

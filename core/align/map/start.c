@@ -13,7 +13,7 @@
  * flips remain is close to chance, and a start that is nearly a map is worth more than all others. */
 static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level *l, const int32_t *to_mesh,
                               int32_t *flips) {
-  orb_map_place(c, l, to_mesh, start);
+  ORB_TRY(orb_map_place(c, l, to_mesh, start));
   orb_map_set_pull(c, l, to_mesh, 1);
   return orb_map_clear_flips(c, l, c->params.clear.first_barrier * c->params.clear.again, c->params.clear.rounds,
                              flips);

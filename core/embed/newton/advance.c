@@ -66,7 +66,7 @@ static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, dou
                              .offset = level->batch_offset,
                              .ring = level->ring,
                              .shape = level->shape,
-                             .weight = orb_refiner_weight(r),
+                             .weight = orb_refiner_energy(r),
                              .relax = relax,
                              .scale = scale_of(r),
                              .energy = level->batch_energy,

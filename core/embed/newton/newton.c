@@ -6,8 +6,8 @@
 #include "embed/newton/multires.h"
 #include "embed/newton/refiner.h"
 
-orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options, double *points,
-                          orb_embed_timings *timings) {
+static orb_status run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
+                      const orb_newton_energy *energy, double *points, orb_embed_timings *timings) {
   orb_hierarchy *hierarchy = NULL;
   orb_refiner *refiner = NULL;
   double start = orb_clock();
@@ -16,6 +16,9 @@ orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embe
   double between = orb_clock();
   timings->simplify = between - start;
   ORB_GO(status, orb_refiner_create(ctx, hierarchy, options, &refiner), done);
+  if (energy) {
+    refiner->settings.energy = *energy;
+  }
   orb_refiner_one_way(refiner);
   ORB_GO(status, orb_refiner_advance(ctx, refiner, mesh->vertex_count), done);
   if (mesh->vertex_count == 4) {
@@ -28,4 +31,17 @@ done:
   orb_refiner_abandon(ctx, refiner);
   orb_hierarchy_destroy(ctx, hierarchy);
   return status;
+}
+
+orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options, double *points,
+                          orb_embed_timings *timings) {
+  return run(ctx, mesh, options, NULL, points, timings);
+}
+
+orb_status orb_newton_run_angles(orb_context *ctx, const orb_mesh *mesh, double *points) {
+  const orb_newton_energy energy = orb_newton_energy_of_angles();
+  orb_embed_options options;
+  orb_embed_timings timings;
+  orb_embed_defaults(&options);
+  return run(ctx, mesh, &options, &energy, points, &timings);
 }

@@ -86,7 +86,7 @@ static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, doub
   }
   if (*found) {
     orb_star_shape(star, s, v, blend);
-    double energy = orb_star_newton(star, orb_refiner_weight(r), p, &before);
+    double energy = orb_star_newton(star, orb_refiner_energy(r), p, &before);
     memcpy(r->point + 4 * (int64_t)v, p, sizeof p);
     r->crowding[v] = (float)(energy / (2 * star->area));
   }

@@ -147,8 +147,12 @@ void orb_refiner_abandon(orb_context *ctx, orb_refiner *r) {
 
 /* Coarse levels do not follow a w below 1: without the symmetric term some of their triangles grow without bound, and
  * finer levels cannot repair that. */
-double orb_refiner_weight(const orb_refiner *r) {
-  return r->live == r->hierarchy->surface.vertex_count ? r->settings.weight : fmax(r->settings.weight, 1);
+orb_newton_energy orb_refiner_energy(const orb_refiner *r) {
+  orb_newton_energy energy = r->settings.energy;
+  if (r->live < r->hierarchy->surface.vertex_count && energy.angle == 0) {
+    energy.w = fmax(energy.w, 1);
+  }
+  return energy;
 }
 
 void orb_refiner_one_way(orb_refiner *r) {

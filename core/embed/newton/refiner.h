@@ -4,6 +4,7 @@
 #define ORB_EMBED_NEWTON_REFINER_H
 
 #include "embed/newton/hierarchy.h"
+#include "embed/newton/settings.h"
 #include "orbmorph/embed.h"
 
 typedef struct orb_refiner orb_refiner;
@@ -43,7 +44,7 @@ void orb_refiner_pin(orb_refiner *refiner, int32_t vertex, int pinned);
 /* The points of all vertices (3 a vertex), once all live. */
 void orb_refiner_points(const orb_refiner *refiner, double *points);
 
-/* The w of the energy that holds at the current level. */
-double orb_refiner_weight(const orb_refiner *refiner);
+/* The energy that holds at the current level. */
+orb_newton_energy orb_refiner_energy(const orb_refiner *refiner);
 
 #endif

@@ -19,7 +19,7 @@ orb_status orb_refiner_relax(orb_context *ctx, orb_refiner *r, int32_t v, double
   }
   ORB_TRY(orb_star_walk(ctx, star, &r->hierarchy->surface, v, r->point));
   orb_star_shape(star, &r->hierarchy->surface, v, blend);
-  double before, after = orb_star_newton(star, orb_refiner_weight(r), r->point + 4 * (int64_t)v, &before);
+  double before, after = orb_star_newton(star, orb_refiner_energy(r), r->point + 4 * (int64_t)v, &before);
   if (isfinite(before) && before > 0) {
     *gain = (before - after) / before;
     if (crowding) {

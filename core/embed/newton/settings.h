@@ -6,6 +6,11 @@
 
 enum { ORB_NEWTON_FAR = 8 }; /* a level of fewer vertices than this share of all is far from full resolution */
 
+/* E = Σ D (w + angle · a/d + area · a²/d²). D a/d depends on angles alone; D a²/d² grows as a triangle loses area. */
+typedef struct orb_newton_energy {
+  double w, angle, area;
+} orb_newton_energy;
+
 typedef struct orb_newton_settings {
   double growth, growth_fine; /* of the number of vertices from level to level, below and from fine_from vertices on */
   int32_t fine_from;
@@ -15,12 +20,15 @@ typedef struct orb_newton_settings {
   double converged, converged_last; /* _last: at full resolution */
   double settled, settled_last;     /* a sweep that lowers the energy by less than this share ends the level */
   double settled_far;               /* the same far from full resolution, where sweeps cost next to nothing */
-  double weight;                    /* w of the energy */
+  orb_newton_energy energy;
   double blend;                     /* of the shapes of coarse triangles towards equilateral, 0 to 1 */
   double finest;  /* the same at full resolution: keeps degenerate triangles finite, changes no other */
   double crowded; /* energy per area (1: isometric) above which a new star's surroundings are relaxed */
 } orb_newton_settings;
 
 void orb_newton_settings_of(const orb_embed_options *options, orb_newton_settings *out);
+
+/* The energy of embeddings that keep angles and let areas go. */
+orb_newton_energy orb_newton_energy_of_angles(void);
 
 #endif

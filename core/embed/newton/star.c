@@ -114,7 +114,7 @@ static void localise(orb_star *star, const double p[3], double e1[3], double e2[
 }
 
 /* The energy at tangent coordinates (s, t), pulled back to the sphere; infinite outside the kernel. */
-static double energy_at(const orb_star *star, double weight, double s, double t) {
+static double energy_at(const orb_star *star, orb_newton_energy e, double s, double t) {
   double length = sqrt(1 + s * s + t * t), inverse = 1 / length;
   double x = s * inverse, y = t * inverse, z = -(s * s + t * t) * inverse / (length + 1), energy = 0;
   int32_t k = star->count;
@@ -128,7 +128,8 @@ static double energy_at(const orb_star *star, double weight, double s, double t)
     }
     double dirichlet =
         star->ca[i] * (ax * ax + ay * ay + az * az) + star->cb[i] * (bx * bx + by * by + bz * bz) + star->cc[i];
-    energy += dirichlet * (weight + star->a2[i] / (d * d));
+    double h = star->a2[i] / (d * d);
+    energy += dirichlet * (e.angle > 0 ? e.w + e.angle * sqrt(h) + e.area * h : e.w + e.area * h);
   }
   return energy;
 }
@@ -138,7 +139,7 @@ typedef struct quadratic {
 } quadratic;
 
 /* Energy, gradient and Hessian at p; the energy is infinite where a triangle is not positive. */
-static quadratic expand(const orb_star *star, double weight) {
+static quadratic expand(const orb_star *star, orb_newton_energy e) {
   quadratic q = {0};
   int32_t k = star->count;
   for (int32_t i = 0; i < k; i++) {
@@ -150,12 +151,13 @@ static quadratic expand(const orb_star *star, double weight) {
     }
     double xi = star->x[i], yi = star->y[i], zi = star->z[i], xj = star->x[j], yj = star->y[j], zj = star->z[j];
     double dirichlet = ca * (xi * xi + yi * yi + zi * zi) + cb * (xj * xj + yj * yj + zj * zj) + star->cc[i];
-    double r = 1 / d, h = star->a2[i] * r * r, f = weight + h, c = -2 * h * r;
+    double r = 1 / d, h = e.area * (star->a2[i] * r * r), a = e.angle > 0 ? e.angle * sqrt(star->a2[i]) * r : 0;
+    double f = e.w + h + a, c = -2 * h * r - a * r;
     double dx = -2 * (ca * xi + cb * xj), dy = -2 * (ca * yi + cb * yj);
     q.energy += dirichlet * f;
     q.gx += f * dx + c * dirichlet * nx;
     q.gy += f * dy + c * dirichlet * ny;
-    double bend = f * 2 * (ca * (1 + zi) + cb * (1 + zj)) - c * dirichlet * d, g = 6 * dirichlet * h * r * r;
+    double bend = f * 2 * (ca * (1 + zi) + cb * (1 + zj)) - c * dirichlet * d, g = (6 * dirichlet * h + 2 * dirichlet * a) * r * r;
     q.hxx += bend + 2 * c * dx * nx + g * nx * nx;
     q.hyy += bend + 2 * c * dy * ny + g * ny * ny;
     q.hxy += c * (dx * ny + dy * nx) + g * nx * ny;
@@ -188,17 +190,17 @@ static double longest_step(const orb_star *star, double s, double t) {
   return tau * length > 0.5 ? 0.5 / length : tau;
 }
 
-double orb_star_newton(orb_star *star, double weight, double p[3], double *before) {
+double orb_star_newton(orb_star *star, orb_newton_energy e, double p[3], double *before) {
   double e1[3], e2[3], s, t;
   localise(star, p, e1, e2);
-  quadratic q = expand(star, weight);
+  quadratic q = expand(star, e);
   *before = q.energy;
   if (!isfinite(q.energy) || !solve_step(q, &s, &t)) {
     return q.energy;
   }
   double tau = longest_step(star, s, t);
   for (int i = 0; i < TRIES; i++, tau *= 0.4) {
-    double energy = energy_at(star, weight, tau * s, tau * t);
+    double energy = energy_at(star, e, tau * s, tau * t);
     if (energy < q.energy) {
       double moved[3];
       for (int k = 0; k < 3; k++) {

@@ -3,12 +3,13 @@
  * the vector sweeps leave over.
  *
  * With p the centre and q, r neighbours on the ring, D = ½ Σ cot·|edge|² of the image is affine and d = det(p, q, r)
- * linear in p, so the energy Σ D (w + a²/d²) has a cheap gradient and Hessian in the tangent plane, and it is its own
- * barrier at the edge of the kernel. */
+ * linear in p, so the energy Σ D (w + angle · a/d + area · a²/d²) has a cheap gradient and Hessian in the tangent plane,
+ * and it is its own barrier at the edge of the kernel. */
 #ifndef ORB_EMBED_NEWTON_STAR_H
 #define ORB_EMBED_NEWTON_STAR_H
 
 #include "embed/common/corner_table.h"
+#include "embed/newton/settings.h"
 
 typedef struct orb_star {
   int32_t count, capacity;
@@ -34,6 +35,6 @@ void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double
 /* Moves p by at most one damped Newton step that lowers the energy and keeps every triangle exactly positive. Returns
  * the energy after the step; *before: the energy before it. Both are infinite where p is too near the edge of the
  * kernel to tell. */
-double orb_star_newton(orb_star *star, double weight, double p[3], double *before);
+double orb_star_newton(orb_star *star, orb_newton_energy energy, double p[3], double *before);
 
 #endif

@@ -188,7 +188,6 @@ typedef struct orb_map_params {
     int clearings; /* rounds of clearing the flips that came */
     double pull;   /* strength in the first round, relative to the energy of a vertex's area */
     double fall;   /* its factor from round to round */
-    double leap;   /* ratio of a round's energy to the last one's from which on clearing its flips has folded a limb */
   } draw;
 
   /* Landmarks that a map without them takes near their partners, and that are shifted there. */
@@ -274,6 +273,19 @@ typedef struct orb_map_params {
     double jitter;        /* of barycentric coordinates: vertices that share a point cannot be untangled */
     double given_jitter;  /* the same for targets that are given: few of them share a point */
   } place;
+
+  /* Smoothing of places on the sphere. Chosen on eight pairs of posed people of the half `choose` of
+     tests/bench/correspond.py. */
+  struct {
+    int rounds;              /* of weighing the targets; with more, whole limbs let go of theirs */
+    int sweeps;              /* of a round */
+    double over;             /* over-relaxation of the sweeps */
+    double reach;            /* a vertex follows its neighbours within this distance: more than the noise, less than
+                                the girth of a limb */
+    double outlier;          /* distance from its target at which a vertex counts a quarter */
+    double least_cotangent;  /* of an edge: obtuse triangles would push their neighbours away, */
+    double most_cotangent;   /* and flat ones would hold them */
+  } smooth;
 
   /* Twisted limbs: which parts are examined, and when one counts. */
   struct {

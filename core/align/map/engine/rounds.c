@@ -169,12 +169,12 @@ done:
   return status;
 }
 
-/* Rounds whose flips cannot be cleared, or whose energy leaps because clearing has folded a limb another way, are the
- * last; the map of least energy stays. */
+/* A round that does not lower the energy is the last, since the pull of the next one is weaker; the map of least energy
+ * stays. */
 orb_status orb_map_draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
   const orb_map_params *params = &c->params;
   orb_map_copy best = {0};
-  double pull = params->draw.pull, least = orb_map_level_energy(l), last = INFINITY;
+  double pull = params->draw.pull, least = orb_map_level_energy(l);
   orb_status status;
   int held = 1;
   ORB_GO(status, orb_map_copy_take(c, l, &best), done);
@@ -182,13 +182,12 @@ orb_status orb_map_draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh
     orb_map_set_pull(c, l, to_mesh, pull);
     ORB_GO(status, draw_round(c, l, &held), done);
     double energy = orb_map_level_energy(l);
+    held = held && energy < least;
     if (energy < least) {
       least = energy;
       orb_map_copy_free(c, &best);
       ORB_GO(status, orb_map_copy_take(c, l, &best), done);
     }
-    held = held && energy < params->draw.leap * last;
-    last = energy;
   }
   if (orb_map_level_energy(l) > least) {
     orb_map_copy_restore(&best, l);

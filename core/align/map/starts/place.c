@@ -5,6 +5,7 @@
 #include "align/map/engine/spread.h"
 #include "align/map/starts/place.h"
 #include "align/map/starts/registration.h"
+#include "align/map/starts/smooth.h"
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"
@@ -188,11 +189,12 @@ static void spread_out(orb_map_run *c, orb_map_level *l) {
   }
 }
 
-void orb_map_place(orb_map_run *c, orb_map_level *level, const int32_t *to_mesh, orb_map_start start) {
+orb_status orb_map_place(orb_map_run *c, orb_map_level *level, const int32_t *to_mesh, orb_map_start start) {
   const double *points = start == ORB_MAP_SPATIAL ? NULL : start == ORB_MAP_DRAWN ? c->best : c->start;
   place_job job = {c, level, to_mesh, points};
   orb_parallel_for(c->ctx, level->count, 16, place_range, &job);
   if (start == ORB_MAP_SPATIAL) {
     spread_out(c, level);
   }
+  return start == ORB_MAP_SPATIAL && c->given_target ? orb_map_smooth(c, level) : ORB_OK;
 }

@@ -6,6 +6,7 @@
  *   mirror.h         mirror landmarks
  *   spectral_samples.h  samples that correspond by eigenfunctions
  *   registration.h   spatial targets by non-rigid registration
+ *   smooth.h         where noisy places are a map
  *   place.h          their places on the fixed shape, and the vertices of a level at them
  *   landmark_walk.h  a map in which all pairs meet
  *   shift.h          landmarks of a map moved to their partners nearby
@@ -19,7 +20,8 @@
  * normals of the registered shape, and with the nearest places on the fixed shape. */
 ORB_MUST_CHECK orb_status orb_map_register(orb_map_run *run, int samples);
 
-/* Puts the vertices of a level where the start has them. to_mesh: of the surface's vertices. */
-void orb_map_place(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh, orb_map_start start);
+/* Puts the vertices of a level where the start has them; where targets are given, smoothed. to_mesh: of the surface's
+ * vertices. */
+ORB_MUST_CHECK orb_status orb_map_place(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh, orb_map_start start);
 
 #endif

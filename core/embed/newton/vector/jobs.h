@@ -5,6 +5,7 @@
 #define ORB_EMBED_NEWTON_VECTOR_JOBS_H
 
 #include "embed/common/corner_table.h"
+#include "embed/newton/settings.h"
 
 enum {
   ORB_COST_RING_MAX = 40, /* neighbours; larger stars cost ORB_COST_LARGE and are collapsed last */
@@ -32,7 +33,8 @@ typedef struct orb_sweep_job {
   const int64_t *offset;      /* of each batch's first ring entry, in lanes */
   const int32_t *ring;        /* lanes a ring entry: vertex numbers */
   const float *shape;         /* 4·lanes a ring entry: half cotangents at ring[i+1], at ring[i], at v; doubled area */
-  double weight, relax;       /* w of the energy; the over-relaxation factor */
+  orb_newton_energy weight;   /* of the parts of the energy */
+  double relax;               /* the over-relaxation factor */
   double scale;               /* about the reciprocal of an edge on the sphere */
   double *energy, *fall;      /* of each batch: the energy of its stars before the pass, and how far it fell */
   uint16_t *stiff;            /* of each batch: bit l is set where lane l was too thin to be moved in plain doubles */

@@ -28,8 +28,14 @@ typedef struct STAR(sweep_star) {
   SV spare;     /* least determinant less what it must exceed */
 } STAR(sweep_star);
 
+/* The weights of the parts of the energy. */
+typedef struct STAR(sweep_weights) {
+  SV w, angle, area;
+} STAR(sweep_weights);
+
 /* Energy, gradient and Hessian at the centre. The first `full` entries are part of every ring. */
-static inline void STAR(sweep_expand)(const float *shape, SV w, int k, int full, SV count, STAR(sweep_star) * q) {
+static inline void STAR(sweep_expand)(const float *shape, STAR(sweep_weights) e, int k, int full, SV count,
+                                      STAR(sweep_star) * q) {
   SV zero = SV_SET(0), energy = zero, gx = zero, gy = zero, hxx = zero, hxy = zero, hyy = zero, spare = SV_SET(1e30F);
   SV down = q->down, down2 = down * down, up2 = q->scale * q->scale;
   SV first = q->ring[0].x * q->ring[0].x + q->ring[0].y * q->ring[0].y + q->ring[0].z * q->ring[0].z, l0 = first,
@@ -56,13 +62,14 @@ static inline void STAR(sweep_expand)(const float *shape, SV w, int k, int full,
     far = SV_MAX(far, l1);
     spare = SV_MIN(spare, d - q->flatness * (l0 + l1));
     SV dirichlet = ca * l0 + cb * l1 + cc;
-    h = h * h;
-    SV f = w + h, dx = -2 * (ca * xi + cb * xj), dy = -2 * (ca * yi + cb * yj);
-    SV c = -2 * h * r, cd = c * dirichlet;
+    SV a = e.angle * h;
+    h = e.area * (h * h);
+    SV f = e.w + h + a, dx = -2 * (ca * xi + cb * xj), dy = -2 * (ca * yi + cb * yj);
+    SV c = -2 * h * r - a * r, cd = c * dirichlet;
     energy += dirichlet * f;
     gx += f * dx + cd * nx;
     gy += f * dy + cd * ny;
-    SV bend = f * (2 * (ca * zi + cb * zj)) - cd * d * down2, g = -3 * cd * r, cx = c * nx, cy = c * ny;
+    SV bend = f * (2 * (ca * zi + cb * zj)) - cd * d * down2, g = -3 * cd * r - a * dirichlet * r * r, cx = c * nx, cy = c * ny;
     hxx += bend + 2 * cx * dx + g * nx * nx;
     hyy += bend + 2 * cy * dy + g * ny * ny;
     hxy += cx * dy + cy * dx + g * nx * ny;
@@ -97,8 +104,8 @@ static inline void STAR(sweep_direction)(STAR(sweep_star) * q, SV relax, int k) 
 }
 
 /* The energy at (s, t) on the sphere; *spare as in sweep_star. */
-static inline SV STAR(sweep_energy)(const STAR(sweep_star) * q, const float *shape, SV w, int k, SV s, SV t,
-                                    SV *spare) {
+static inline SV STAR(sweep_energy)(const STAR(sweep_star) * q, const float *shape, STAR(sweep_weights) e, int k, SV s,
+                                    SV t, SV *spare) {
   SV down = q->down, up2 = q->scale * q->scale, square = (s * s + t * t) * down * down;
   SV length = SV_SQRT(square + 1), inverse = SV_SET(1) / length;
   SV x = s * inverse, y = t * inverse, z = -square * inverse / (length + 1) * q->scale;
@@ -117,7 +124,7 @@ static inline SV STAR(sweep_energy)(const STAR(sweep_star) * q, const float *sha
     SV dirichlet = SV_ROW(at) * l0 + SV_ROW(at + BATCH) * l1 + q->ring[i].cc;
     SV h = SV_ROW(at + 3 * BATCH) * up2 * SV_RECIPROCAL(d);
     thin = SV_MIN(thin, d - q->flatness * (l0 + l1));
-    energy += dirichlet * (w + h * h);
+    energy += dirichlet * (e.w + h * (e.angle + e.area * h));
     l0 = l1;
   }
   *spare = thin - q->least * q->radius;
@@ -126,10 +133,10 @@ static inline SV STAR(sweep_energy)(const STAR(sweep_star) * q, const float *sha
 
 /* One length of the step. `todo`: the lanes that have not moved; those that move now leave it. Then the next is half as
  * long. *s, *t, *after: where the lanes are, and their energy there. */
-static inline void STAR(sweep_try)(STAR(sweep_star) * q, const float *shape, SV w, int k, SM *todo, SV *s, SV *t,
-                                   SV *after) {
+static inline void STAR(sweep_try)(STAR(sweep_star) * q, const float *shape, STAR(sweep_weights) e, int k, SM *todo,
+                                   SV *s, SV *t, SV *after) {
   SV spare, try_s = q->s * q->tau, try_t = q->t * q->tau;
-  SV energy = STAR(sweep_energy)(q, shape, w, k, try_s, try_t, &spare);
+  SV energy = STAR(sweep_energy)(q, shape, e, k, try_s, try_t, &spare);
   SM good = *todo & (SM)(energy < q->energy) & (SM)(spare > SV_SET(0));
   *s = SV_CHOOSE(good, try_s, *s);
   *t = SV_CHOOSE(good, try_t, *t);

@@ -58,6 +58,14 @@ static inline void sweep_open(const orb_sweep_job *job, int64_t batch, int half,
   at->e2[2] = -p1;
 }
 
+static inline sweep_weights_floats sweep_weights_of_floats(const orb_newton_energy *e) {
+  return (sweep_weights_floats){bf_set((float)e->w), bf_set((float)e->angle), bf_set((float)e->area)};
+}
+
+static inline sweep_weights_doubles sweep_weights_of_doubles(const orb_newton_energy *e) {
+  return (sweep_weights_doubles){vd_set(e->w), vd_set(e->angle), vd_set(e->area)};
+}
+
 /* Moves the lanes by (s, t), those not at all where both are 0. Lanes that stand for the same vertex move alike. */
 static inline void sweep_store(const orb_sweep_job *job, int64_t batch, int half, const sweep_frame *at, vd s, vd t) {
   vd to[3];
@@ -87,7 +95,8 @@ static unsigned sweep_half(const orb_sweep_job *job, int64_t batch, int half, do
   int k = job->valence[batch], used = job->fill[batch] - half * LANES;
   const int32_t *ring = job->ring + job->offset[batch] * BATCH + half * LANES;
   const float *shape = job->shape + 4 * job->offset[batch] * BATCH + half * LANES;
-  vd count, w = vd_set(job->weight);
+  vd count;
+  const sweep_weights_doubles w = sweep_weights_of_doubles(&job->weight);
   if (k < 3 || k > ORB_SWEEP_RING_MAX) {
     __builtin_unreachable(); /* level.c makes no such batch */
   }
@@ -179,7 +188,7 @@ static inline void sweep_begin(const orb_sweep_job *job, int64_t batch, sweep_wh
   b->q.down = bf_set(1 / scale);
   b->q.flatness = bf_set(SWEEP_FLAT);
   b->q.least = bf_set(2e-14F * scale);
-  sweep_expand_floats(b->shape, bf_set((float)job->weight), k, counts[0], count, &b->q);
+  sweep_expand_floats(b->shape, sweep_weights_of_floats(&job->weight), k, counts[0], count, &b->q);
   bm fine = (bm)(b->q.spare > bf_set(0)) & (bm)(b->q.energy < bf_set(1e20F));
   b->in_floats = bm_bits(fine) == (unsigned)((1ULL << BATCH) - 1);
 }
@@ -210,7 +219,8 @@ static void sweep_in_doubles(const orb_sweep_job *job, int64_t batch) {
 /* Some batches side by side, stage by stage: a stage is short enough for the processor to overlap its batches. */
 static void sweep_group(const orb_sweep_job *job, int64_t first, int count) {
   sweep_whole group[SWEEP_GROUP];
-  bf w = bf_set((float)job->weight), relax = bf_set((float)job->relax);
+  const sweep_weights_floats w = sweep_weights_of_floats(&job->weight);
+  bf relax = bf_set((float)job->relax);
   for (int i = 0; i < count; i++) {
     sweep_begin(job, first + i, &group[i]);
   }

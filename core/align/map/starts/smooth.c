@@ -1,0 +1,94 @@
+/* Minimises ∫ |∇x|² + trust · |x − target|² / reach² over the moving shape by over-relaxed Gauss–Seidel sweeps, where x is
+ * the point on the sphere; then trusts each target by how far x has moved from it, measured on the fixed shape; and so
+ * on (iteratively reweighted least squares). Between the rounds x is not normalised: it stays near the sphere. */
+#include "align/map/starts/smooth.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "numeric/vec3.h"
+
+typedef struct smoothing {
+  orb_map_level *level;
+  const orb_map_params *params;
+  double *target; /* 3 a vertex: where it was placed, on the sphere */
+  double *trust;  /* 0 to 1 */
+} smoothing;
+
+static double bounded(const smoothing *s, double cotangent) {
+  return fmin(fmax(cotangent, s->params->smooth.least_cotangent), s->params->smooth.most_cotangent);
+}
+
+/* One vertex to the mean of its target and its neighbours. */
+static void relax(const smoothing *s, int32_t v) {
+  const orb_map_level *l = s->level;
+  const double reach = s->params->smooth.reach;
+  double all = 2 * s->trust[v] * l->area[v] / (reach * reach), sum[3], *x = l->x + 3 * (size_t)v;
+  for (int k = 0; k < 3; k++) {
+    sum[k] = all * s->target[3 * (size_t)v + (size_t)k];
+  }
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    const orb_map_spoke *spoke = &l->spoke[i];
+    const double wq = bounded(s, spoke->cr), wr = bounded(s, spoke->cq);
+    const double *q = l->x + 3 * (size_t)spoke->q, *r = l->x + 3 * (size_t)spoke->r;
+    for (int k = 0; k < 3; k++) {
+      sum[k] += wq * q[k] + wr * r[k];
+    }
+    all += wq + wr;
+  }
+  for (int k = 0; k < 3; k++) {
+    x[k] += s->params->smooth.over * (sum[k] / all - x[k]);
+  }
+}
+
+/* Trusts the targets anew. The density of the fixed shape takes distances on the sphere to distances on that shape. */
+static void weigh(const smoothing *s) {
+  const orb_map_level *l = s->level;
+  const double outlier = s->params->smooth.outlier;
+  for (int32_t v = 0; v < l->count; v++) {
+    const double far2 = orb_distance2(l->x + 3 * (size_t)v, s->target + 3 * (size_t)v);
+    const double scale2 = fmax(l->density[v], 1e-300); /* not 0 where the fixed shape has a flat triangle */
+    const double share = 1 / (1 + far2 / (scale2 * outlier * outlier));
+    s->trust[v] = share * share;
+  }
+}
+
+orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l) {
+  const orb_map_params *p = &c->params;
+  smoothing s = {.level = l,
+                 .params = p,
+                 .target = ORB_NEW(c->ctx, double, 3 * (size_t)l->count),
+                 .trust = ORB_NEW(c->ctx, double, l->count)};
+  orb_status status = s.target && s.trust ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  memcpy(s.target, l->x, 3 * (size_t)l->count * sizeof *s.target);
+  for (int32_t v = 0; v < l->count; v++) {
+    s.trust[v] = 1;
+  }
+  for (int round = 0; round < p->smooth.rounds; round++) {
+    for (int sweep = 0; sweep < p->smooth.sweeps; sweep++) {
+      for (int32_t v = 0; v < l->count; v++) {
+        if (!l->pinned[v]) {
+          relax(&s, v);
+        }
+      }
+      ORB_GO(status, orb_context_check(c->ctx), done);
+    }
+    weigh(&s);
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    if (!l->pinned[v]) {
+      orb_normalize(l->x + 3 * (size_t)v);
+    }
+  }
+  status = orb_map_level_locate_all(c->ctx, l, &c->b, 0);
+done:
+  orb_free(c->ctx, s.target);
+  orb_free(c->ctx, s.trust);
+  return status;
+}

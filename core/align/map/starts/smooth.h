@@ -1,0 +1,15 @@
+/* Smooths the places of a start from spatial targets.
+ *
+ * The nearest places of a shape that lies near the fixed one are a map but for noise and outliers: neighbours that
+ * change places, and parts of a limb that found the limb beside it. Both make folds, which clearing flips cannot always
+ * undo. On the sphere, an outlier is far from where its neighbours are, even where limbs touch in space. */
+#ifndef ORB_ALIGN_MAP_STARTS_SMOOTH_H
+#define ORB_ALIGN_MAP_STARTS_SMOOTH_H
+
+#include "align/map/engine/run.h"
+
+/* Moves the vertices of a level that are not pinned to where their targets and their neighbours draw them, and locates
+ * them there. Targets that most neighbours contradict count less from round to round. O(vertices), one thread. */
+ORB_MUST_CHECK orb_status orb_map_smooth(orb_map_run *run, orb_map_level *level);
+
+#endif
