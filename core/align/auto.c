@@ -1,9 +1,10 @@
 /* Alignment without landmarks.
  *
- * The shapes are embedded anew, on spheres that keep angles. Every later shape is matched with the first one (find/match.c), and the composed map goes to the targets of its
- * match. Where that leads to no good map, pairs of the matches are pinned as landmarks, and the map is composed with
- * them held and then without them. Where that leads to none of two shapes either, samples of the match guide landmark
- * walks. The alignment of least energy is returned. The preset `fast` searches for rotations of the spheres only.
+ * The shapes are embedded anew, on spheres that keep angles. Every later shape is matched with the first one
+ * (find/match.c), and the composed map goes to the targets of its match. Where that leads to no good map, pairs of the
+ * matches are pinned as landmarks, and the map is composed with them held and then without them. Where that leads to
+ * none of two shapes either, samples of the match guide landmark walks. The alignment of least energy is returned. The
+ * preset `fast` searches for rotations of the given spheres only.
  */
 #include <math.h>
 #include <string.h>
@@ -369,12 +370,14 @@ static void spheres_free(orb_context *ctx, double **points, int32_t shape_count)
   orb_free(ctx, points);
 }
 
-/* Embeds the shapes anew with the energy of angles. The given embeddings keep areas, which stretches limbs on the sphere
- * six times as much around as along: a straight edge of one shape then cuts off so much of an arc of the other that one
- * triangle in twelve flips where the shapes lie on each other. Angles leave half of these flips. *points: what `even`
- * refers to; the caller frees it. A sphere that is not certified leaves the given one. */
+/* Embeds the shapes anew with the energy of angles. The given embeddings keep areas, which stretches limbs on the
+ * sphere six times as much around as along: a straight edge of one shape then cuts off so much of an arc of the other
+ * that one triangle in twelve flips where the shapes lie on each other. Angles leave half of these flips. *points: what
+ * `even` refers to; the caller frees it. A sphere that is not certified leaves the given one. */
 static orb_status make_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, orb_align_shape *even,
                             double **points) {
+  orb_embed_options options;
+  orb_embed_defaults(&options);
   for (int32_t s = 0; s < shape_count; s++) {
     const orb_mesh *mesh = shapes[s].mesh;
     orb_certificate certificate;
@@ -383,9 +386,8 @@ static orb_status make_even(orb_context *ctx, const orb_align_shape *shapes, int
     if (!points[s]) {
       return ORB_E_NO_MEMORY;
     }
-    ORB_TRY(orb_newton_run_angles(ctx, mesh, points[s]));
-    ORB_TRY(
-        orb_certify(ctx, points[s], mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate));
+    ORB_TRY(orb_newton_run_angles(ctx, mesh, &options, points[s]));
+    ORB_TRY(orb_certify(ctx, points[s], mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate));
     if (certificate.valid) {
       even[s].points = points[s];
     }

@@ -32,11 +32,11 @@ static orb_status start_through_samples(orb_map_run *c) {
   return status == ORB_OK ? orb_map_run_start(c, ORB_MAP_SPATIAL) : status;
 }
 
-static orb_status start_coarser(orb_map_run *c) {
-  int32_t usual = c->params.level.spatial;
+/* From the targets on a coarser level. */
+static orb_status start_coarser(orb_map_run *c, int32_t size) {
+  const int32_t usual = c->params.level.spatial;
   allow(c);
-  ORB_TRY(orb_map_register(c, 0));
-  c->params.level.spatial = c->params.level.given;
+  c->params.level.spatial = size;
   orb_status status = orb_map_run_start(c, ORB_MAP_SPATIAL);
   c->params.level.spatial = usual;
   return status;
@@ -59,13 +59,14 @@ done:
 }
 
 static orb_status run_starts(orb_map_run *c) {
+  const orb_map_params *p = &c->params;
   ORB_TRY(orb_map_register(c, 0));
   ORB_TRY(orb_map_levels_prepare(c));
   ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
-  if (c->best_energy > c->params.energy.poor) {
-    ORB_TRY(start_through_samples(c));
+  for (int i = 0; i < 2 && c->best_energy > p->energy.poor; i++) {
+    ORB_TRY(start_coarser(c, p->level.given[i]));
   }
-  return c->best_energy > c->params.energy.poor ? start_coarser(c) : ORB_OK;
+  return c->best_energy > p->energy.poor ? start_through_samples(c) : ORB_OK;
 }
 
 static orb_status draw(orb_map_run *c) {

@@ -52,14 +52,15 @@ end:
 static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                        int32_t count, const orb_align_options *options, int64_t work, int *held, int32_t *shape) {
   orb_preset preset = options->preset;
-  int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE;
+  orb_walk_options walk = {.preset = preset,
+                           .coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE};
   double most = options->max_growth > 0 ? options->max_growth : ORB_PIN_GROWTH;
   orb_pin_room room = {most < GROWTH_SMALL ? most : GROWTH_SMALL, work};
   int stuck = 1;
   *held = 1;
   *shape = 0;
-  for (int attempt = 0; attempt < WALKS && stuck; attempt++, coarse *= 2) {
-    ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, preset, coarse, NULL, &stuck));
+  for (int attempt = 0; attempt < WALKS && stuck; attempt++, walk.coarse *= 2) {
+    ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, &walk, NULL, &stuck));
   }
   if (!stuck) {
     return ORB_OK;

@@ -109,7 +109,7 @@ static orb_status read_level(walker *w) {
 }
 
 static orb_status walker_create(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
-                                orb_preset preset, int32_t coarse, walker *w) {
+                                const orb_walk_options *walk, walker *w) {
   const orb_mesh *mesh = &sheet->shape.mesh;
   orb_status status = ORB_OK;
   *w = (walker){.ctx = ctx, .sheet = sheet, .landmarks = landmarks, .count = count};
@@ -122,10 +122,13 @@ static orb_status walker_create(orb_context *ctx, orb_sheet *sheet, const int32_
   }
   orb_embed_options options;
   orb_embed_defaults(&options);
-  options.preset = preset;
-  ORB_GO(status, orb_hierarchy_create(ctx, mesh, keep, coarse, &w->hierarchy), end);
+  options.preset = walk->preset;
+  ORB_GO(status, orb_hierarchy_create(ctx, mesh, keep, walk->coarse, &w->hierarchy), end);
   ORB_GO(status, orb_refiner_create(ctx, w->hierarchy, &options, &w->refiner), end);
-  ORB_GO(status, orb_refiner_advance(ctx, w->refiner, coarse), end);
+  if (walk->keep_angles) {
+    orb_refiner_keep_angles(w->refiner);
+  }
+  ORB_GO(status, orb_refiner_advance(ctx, w->refiner, walk->coarse), end);
   ORB_GO(status, read_level(w), end);
 end:
   orb_free(ctx, keep);
@@ -357,7 +360,7 @@ static orb_status finish_all(orb_context *ctx, walker *walkers, const orb_sheet 
 }
 
 orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
-                        int32_t count, orb_preset preset, int32_t coarse, orb_walk_level *last, int *stuck) {
+                        int32_t count, const orb_walk_options *options, orb_walk_level *last, int *stuck) {
   orb_status status = ORB_OK;
   walker *walkers = ORB_NEW0(ctx, walker, shape_count);
   double *targets = ORB_NEW(ctx, double, 3 * (size_t)count), **points = ORB_NEW0(ctx, double *, shape_count);
@@ -367,7 +370,7 @@ orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count
     goto end;
   }
   for (int32_t s = 0; s < shape_count; s++) {
-    ORB_GO(status, walker_create(ctx, &sheets[s], landmarks, count, preset, coarse, &walkers[s]), end);
+    ORB_GO(status, walker_create(ctx, &sheets[s], landmarks, count, options, &walkers[s]), end);
     if (!all_live(&walkers[s])) {
       goto end;
     }

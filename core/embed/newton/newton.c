@@ -6,8 +6,8 @@
 #include "embed/newton/multires.h"
 #include "embed/newton/refiner.h"
 
-static orb_status run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
-                      const orb_newton_energy *energy, double *points, orb_embed_timings *timings) {
+static orb_status run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options, int keep_angles,
+                      double *points, orb_embed_timings *timings) {
   orb_hierarchy *hierarchy = NULL;
   orb_refiner *refiner = NULL;
   double start = orb_clock();
@@ -16,8 +16,8 @@ static orb_status run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_op
   double between = orb_clock();
   timings->simplify = between - start;
   ORB_GO(status, orb_refiner_create(ctx, hierarchy, options, &refiner), done);
-  if (energy) {
-    refiner->settings.energy = *energy;
+  if (keep_angles) {
+    orb_refiner_keep_angles(refiner);
   }
   orb_refiner_one_way(refiner);
   ORB_GO(status, orb_refiner_advance(ctx, refiner, mesh->vertex_count), done);
@@ -35,13 +35,11 @@ done:
 
 orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options, double *points,
                           orb_embed_timings *timings) {
-  return run(ctx, mesh, options, NULL, points, timings);
+  return run(ctx, mesh, options, 0, points, timings);
 }
 
-orb_status orb_newton_run_angles(orb_context *ctx, const orb_mesh *mesh, double *points) {
-  const orb_newton_energy energy = orb_newton_energy_of_angles();
-  orb_embed_options options;
+orb_status orb_newton_run_angles(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
+                                 double *points) {
   orb_embed_timings timings;
-  orb_embed_defaults(&options);
-  return run(ctx, mesh, &options, &energy, points, &timings);
+  return run(ctx, mesh, options, 1, points, &timings);
 }

@@ -147,6 +147,10 @@ void orb_refiner_abandon(orb_context *ctx, orb_refiner *r) {
 
 /* Coarse levels do not follow a w below 1: without the symmetric term some of their triangles grow without bound, and
  * finer levels cannot repair that. */
+void orb_refiner_keep_angles(orb_refiner *r) {
+  r->settings.energy = orb_newton_energy_of_angles();
+}
+
 orb_newton_energy orb_refiner_energy(const orb_refiner *r) {
   orb_newton_energy energy = r->settings.energy;
   if (r->live < r->hierarchy->surface.vertex_count && energy.angle == 0) {

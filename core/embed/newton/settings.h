@@ -2,14 +2,10 @@
 #ifndef ORB_EMBED_NEWTON_SETTINGS_H
 #define ORB_EMBED_NEWTON_SETTINGS_H
 
+#include "embed/newton/vector/jobs.h"
 #include "orbmorph/embed.h"
 
 enum { ORB_NEWTON_FAR = 8 }; /* a level of fewer vertices than this share of all is far from full resolution */
-
-/* E = Σ D (w + angle · a/d + area · a²/d²). D a/d depends on angles alone; D a²/d² grows as a triangle loses area. */
-typedef struct orb_newton_energy {
-  double w, angle, area;
-} orb_newton_energy;
 
 typedef struct orb_newton_settings {
   double growth, growth_fine; /* of the number of vertices from level to level, below and from fine_from vertices on */
@@ -21,7 +17,7 @@ typedef struct orb_newton_settings {
   double settled, settled_last;     /* a sweep that lowers the energy by less than this share ends the level */
   double settled_far;               /* the same far from full resolution, where sweeps cost next to nothing */
   orb_newton_energy energy;
-  double blend;                     /* of the shapes of coarse triangles towards equilateral, 0 to 1 */
+  double blend;   /* of the shapes of coarse triangles towards equilateral, 0 to 1 */
   double finest;  /* the same at full resolution: keeps degenerate triangles finite, changes no other */
   double crowded; /* energy per area (1: isometric) above which a new star's surroundings are relaxed */
 } orb_newton_settings;

@@ -157,7 +157,8 @@ static quadratic expand(const orb_star *star, orb_newton_energy e) {
     q.energy += dirichlet * f;
     q.gx += f * dx + c * dirichlet * nx;
     q.gy += f * dy + c * dirichlet * ny;
-    double bend = f * 2 * (ca * (1 + zi) + cb * (1 + zj)) - c * dirichlet * d, g = (6 * dirichlet * h + 2 * dirichlet * a) * r * r;
+    double bend = f * 2 * (ca * (1 + zi) + cb * (1 + zj)) - c * dirichlet * d,
+           g = (6 * dirichlet * h + 2 * dirichlet * a) * r * r;
     q.hxx += bend + 2 * c * dx * nx + g * nx * nx;
     q.hyy += bend + 2 * c * dy * ny + g * ny * ny;
     q.hxy += c * (dx * ny + dy * nx) + g * nx * ny;

@@ -3,8 +3,8 @@
  * the vector sweeps leave over.
  *
  * With p the centre and q, r neighbours on the ring, D = ½ Σ cot·|edge|² of the image is affine and d = det(p, q, r)
- * linear in p, so the energy Σ D (w + angle · a/d + area · a²/d²) has a cheap gradient and Hessian in the tangent plane,
- * and it is its own barrier at the edge of the kernel. */
+ * linear in p, so the energy Σ D (w + angle · a/d + area · a²/d²) has a cheap gradient and Hessian in the tangent
+ * plane, and it is its own barrier at the edge of the kernel. */
 #ifndef ORB_EMBED_NEWTON_STAR_H
 #define ORB_EMBED_NEWTON_STAR_H
 

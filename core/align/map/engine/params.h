@@ -60,7 +60,7 @@ typedef struct orb_map_params {
   /* Levels of a start, and sweeps on them. */
   struct {
     int32_t spatial;    /* level at which a start from spatial targets begins. Coarser is faster and folds more */
-    int32_t given;      /* the same for the last attempt at targets that are given */
+    int32_t given[2];   /* the same for further attempts at targets that are given */
     int32_t mapped;     /* level at which a start from a map begins: a coarser one would fold it */
     int32_t last;       /* level beyond which a start gives up untangling */
     int32_t kept;       /* least vertices of the coarsest level if vertices are kept on it, */
@@ -277,14 +277,14 @@ typedef struct orb_map_params {
   /* Smoothing of places on the sphere. Chosen on eight pairs of posed people of the half `choose` of
      tests/bench/correspond.py. */
   struct {
-    int rounds;              /* of weighing the targets; with more, whole limbs let go of theirs */
-    int sweeps;              /* of a round */
-    double over;             /* over-relaxation of the sweeps */
-    double reach;            /* a vertex follows its neighbours within this distance: more than the noise, less than
-                                the girth of a limb */
-    double outlier;          /* distance from its target at which a vertex counts a quarter */
-    double least_cotangent;  /* of an edge: obtuse triangles would push their neighbours away, */
-    double most_cotangent;   /* and flat ones would hold them */
+    int rounds;             /* of weighing the targets; with more, whole limbs let go of theirs */
+    int sweeps;             /* of a round */
+    double over;            /* over-relaxation of the sweeps */
+    double reach;           /* a vertex follows its neighbours within this distance: more than the noise, less than
+                               the girth of a limb */
+    double outlier;         /* distance from its target at which a vertex counts a quarter */
+    double least_cotangent; /* of an edge: obtuse triangles would push their neighbours away, */
+    double most_cotangent;  /* and flat ones would hold them */
   } smooth;
 
   /* Twisted limbs: which parts are examined, and when one counts. */

@@ -193,6 +193,7 @@ static orb_status walk_sheets(orb_map_run *c, int32_t count, int32_t finer, orb_
   orb_status status = ORB_OK;
   int32_t coarse = c->params.walk.level_each * count;
   coarse = finer * (coarse > c->params.walk.level ? coarse : c->params.walk.level);
+  const orb_walk_options options = {ORB_PRESET_FAST, coarse, c->given_target != NULL};
   int32_t *numbers = ORB_NEW(ctx, int32_t, count);
   if (!numbers) {
     return ORB_E_NO_MEMORY;
@@ -202,7 +203,7 @@ static orb_status walk_sheets(orb_map_run *c, int32_t count, int32_t finer, orb_
   }
   ORB_GO(status, borrow(ctx, c->fixed, c->pairs.fixed, count, &sheets[0]), done);
   ORB_GO(status, borrow(ctx, c->moving, c->pairs.moving, count, &sheets[1]), done);
-  status = orb_pin_walk(ctx, sheets, 2, numbers, count, ORB_PRESET_FAST, coarse, last, stuck);
+  status = orb_pin_walk(ctx, sheets, 2, numbers, count, &options, last, stuck);
 done:
   orb_free(ctx, numbers);
   return status;

@@ -22,6 +22,7 @@ ORB_MUST_CHECK orb_status orb_map_register(orb_map_run *run, int samples);
 
 /* Puts the vertices of a level where the start has them; where targets are given, smoothed. to_mesh: of the surface's
  * vertices. */
-ORB_MUST_CHECK orb_status orb_map_place(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh, orb_map_start start);
+ORB_MUST_CHECK orb_status orb_map_place(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh,
+                                        orb_map_start start);
 
 #endif

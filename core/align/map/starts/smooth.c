@@ -1,6 +1,6 @@
-/* Minimises ∫ |∇x|² + trust · |x − target|² / reach² over the moving shape by over-relaxed Gauss–Seidel sweeps, where x is
- * the point on the sphere; then trusts each target by how far x has moved from it, measured on the fixed shape; and so
- * on (iteratively reweighted least squares). Between the rounds x is not normalised: it stays near the sphere. */
+/* Minimises ∫ |∇x|² + trust · |x − target|² / reach² over the moving shape by over-relaxed Gauss–Seidel sweeps, where x
+ * is the point on the sphere; then trusts each target by how far x has moved from it, measured on the fixed shape; and
+ * so on (iteratively reweighted least squares). Between the rounds x is not normalised: it stays near the sphere. */
 #include "align/map/starts/smooth.h"
 
 #include <math.h>

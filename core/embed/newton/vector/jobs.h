@@ -5,7 +5,6 @@
 #define ORB_EMBED_NEWTON_VECTOR_JOBS_H
 
 #include "embed/common/corner_table.h"
-#include "embed/newton/settings.h"
 
 enum {
   ORB_COST_RING_MAX = 40, /* neighbours; larger stars cost ORB_COST_LARGE and are collapsed last */
@@ -22,6 +21,11 @@ typedef struct orb_cost_job {
   float *cost;
   int32_t *target;
 } orb_cost_job;
+
+/* E = Σ D (w + angle · a/d + area · a²/d²). D a/d depends on angles alone; D a²/d² grows as a triangle loses area. */
+typedef struct orb_newton_energy {
+  double w, angle, area;
+} orb_newton_energy;
 
 /* One coloured Gauss–Seidel pass over batches of one colour: level.h has the layout. */
 typedef struct orb_sweep_job {

@@ -69,7 +69,8 @@ static inline void STAR(sweep_expand)(const float *shape, STAR(sweep_weights) e,
     energy += dirichlet * f;
     gx += f * dx + cd * nx;
     gy += f * dy + cd * ny;
-    SV bend = f * (2 * (ca * zi + cb * zj)) - cd * d * down2, g = -3 * cd * r - a * dirichlet * r * r, cx = c * nx, cy = c * ny;
+    SV bend = f * (2 * (ca * zi + cb * zj)) - cd * d * down2, g = -3 * cd * r - a * dirichlet * r * r, cx = c * nx,
+       cy = c * ny;
     hxx += bend + 2 * cx * dx + g * nx * nx;
     hyy += bend + 2 * cy * dy + g * ny * ny;
     hxy += cx * dy + cy * dx + g * nx * ny;
