@@ -227,10 +227,8 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
   if (shared != 2) {
     return 0;
   }
-  const double *v = orb_net_point(net, ring[0]);
   for (int i = 1; i + 1 < n; i++) {
-    if (orb_orient(v, orb_net_point(net, ring[i]), orb_net_point(net, ring[i + 1])) <= 0 ||
-        !orb_net_clearly_positive(net, ring[0], ring[i], ring[i + 1])) {
+    if (!orb_net_clearly_positive(net, ring[0], ring[i], ring[i + 1])) {
       return 0;
     }
   }
