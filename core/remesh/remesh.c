@@ -7,6 +7,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "remesh/common/order.h"
 #include "remesh/placed/rims.h"
 #include "remesh/registry.h"
 
@@ -148,7 +149,15 @@ orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t
       .shapes = shapes, .shape_count = shape_count, .landmark_count = landmark_count, .options = options};
   orb_progress(ctx, "remesh", 0);
   out->shape_count = shape_count;
-  orb_status status = prepare(ctx, &job);
+  orb_shape_order order = {0};
+  orb_status status = ORB_OK;
+  if (options->method == ORB_REMESH_ADAPTIVE && !(options->rims && orb_rims_any(&job))) {
+    status = orb_shape_order_make(ctx, shapes, shape_count, landmark_count, &order);
+    job.shapes = order.shapes;
+  }
+  if (status == ORB_OK) {
+    status = prepare(ctx, &job);
+  }
   if (status == ORB_OK) {
     out->error_bound = ORB_NEW(ctx, double, shape_count);
     status = out->error_bound ? ORB_OK : ORB_E_NO_MEMORY;
@@ -175,7 +184,11 @@ orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t
   if (status == ORB_OK) {
     status = orb_supermesh_check(ctx, out);
   }
+  if (status == ORB_OK) {
+    orb_shape_order_restore(&order, out);
+  }
   release(ctx, &job);
+  orb_shape_order_free(ctx, &order);
   if (status != ORB_OK) {
     orb_supermesh_free(ctx, out);
     return status;

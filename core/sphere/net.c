@@ -17,10 +17,6 @@ static int32_t origin(const orb_net *net, int32_t h) {
   return net->triangles[h];
 }
 
-static int is_positive(const orb_net *net, int32_t a, int32_t b, int32_t c) {
-  return orb_orient(orb_net_point(net, a), orb_net_point(net, b), orb_net_point(net, c)) > 0;
-}
-
 orb_status orb_net_reserve(orb_context *ctx, orb_net *net, int64_t more) {
   int64_t vertices = (int64_t)net->vertex_count + more;
   if (vertices <= net->vertex_capacity) {
@@ -173,10 +169,11 @@ int32_t orb_net_split_edge(orb_net *net, int32_t h, const double p[3]) {
   return split_edge(net, h, p);
 }
 
-int orb_net_clearly_positive(const orb_net *net, int32_t a, int32_t b, int32_t c) {
+int orb_net_is_clearly_positive(const orb_net *net, int32_t a, int32_t b, int32_t c) {
   const double *p = orb_net_point(net, a), *q = orb_net_point(net, b), *r = orb_net_point(net, c);
   double height = CLEARLY * orb_det(p, q, r);
-  return height > orb_distance2(p, q) && height > orb_distance2(q, r) && height > orb_distance2(r, p);
+  return height > orb_distance2(p, q) && height > orb_distance2(q, r) && height > orb_distance2(r, p) &&
+         orb_orient(p, q, r) > 0;
 }
 
 int32_t orb_net_edge(const orb_net *net, int32_t v, int32_t w) {
@@ -197,8 +194,8 @@ int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b) {
 int orb_net_can_flip(const orb_net *net, int32_t h) {
   int32_t g = net->twin[h];
   int32_t a = origin(net, h), b = origin(net, g), c = origin(net, orb_prev(h)), d = origin(net, orb_prev(g));
-  return c != d && is_positive(net, c, d, b) && is_positive(net, d, c, a) && orb_net_clearly_positive(net, c, d, b) &&
-         orb_net_clearly_positive(net, d, c, a) && !orb_net_adjacent(net, c, d);
+  return c != d && orb_net_clearly_positive(net, c, d, b) && orb_net_clearly_positive(net, d, c, a) &&
+         !orb_net_adjacent(net, c, d);
 }
 
 /* h = a→b of (a,b,c), twin in (b,a,d). The corners are set so that half-edge h stays the flipped edge:

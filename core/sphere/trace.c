@@ -9,7 +9,7 @@
 #include "numeric/vec3.h"
 #include "orbmorph/mesh.h"
 
-enum { ENDED = 0, ENTERED, AT_VERTEX, IN_FACE, ON_EDGE };
+enum { ENDED = 0, ENTERED = ORB_TRACE_ENTERED, AT_VERTEX, IN_FACE, ON_EDGE };
 
 orb_spot orb_spot_of(const orb_hit *hit) {
   int corner = orb_hit_corner(hit);

@@ -22,6 +22,8 @@ typedef struct orb_crossing {
   int32_t at_vertex;
 } orb_crossing;
 
+enum { ORB_TRACE_ENTERED = 1 }; /* the state of a tracer that has entered the face of h over h */
+
 typedef struct orb_arc_tracer {
   const orb_sphere_view *mesh;
   const double *p, *q;

@@ -360,6 +360,58 @@ static void flat_triangles_are_as_near_as_their_sides(void **state) {
   }
 }
 
+/* The quick walk along an edge gives the answer of the exact one. */
+static void edges_are_within_as_traced(void **state) {
+  (void)state;
+  static const double limit[] = {1e-4, 1e-3, 1e-2, 1e-1};
+  int within[2] = {0, 0};
+  for (unsigned seed = 1; seed <= 4; seed++) {
+    bench b;
+    set_up(&b, seed, seed % 2 ? 0 : 2);
+    const orb_net *net = &b.placed.net;
+    for (int32_t h = 0; h < 3 * net->triangle_count; h++) {
+      /* the edge, and the diagonal across it, which starts in faces, at vertices and on edges of the shapes */
+      int32_t ends[2][2] = {{net->triangles[h], net->triangles[net->twin[h]]},
+                            {net->triangles[orb_prev(h)], net->triangles[orb_prev(net->twin[h])]}};
+      for (int i = 0; i < 8; i++) {
+        int32_t v = ends[i / 4][0], w = ends[i / 4][1];
+        double limit2 = limit[i % 4] * limit[i % 4];
+        int is_within = orb_placed_edge_is_within(&b.placed, v, w, limit2);
+        assert_int_equal(is_within, orb_placed_edge2(&b.placed, v, w, INFINITY, NULL) <= limit2);
+        within[is_within]++;
+      }
+    }
+    tear_down(&b);
+  }
+  assert_true(within[0] > 1000 && within[1] > 1000);
+}
+
+/* The quick walk to a vertex finds what the locator finds, from any triangle. */
+static void vertices_are_located_from_anywhere(void **state) {
+  (void)state;
+  bench b;
+  set_up(&b, 1, 2);
+  unsigned random = 1;
+  for (int32_t v = 0; v < b.placed.net.vertex_count; v++) {
+    for (int32_t s = 0; s < 2; s++) {
+      orb_place place;
+      orb_locate(b.locator[s], orb_net_point(&b.placed.net, v), -1, &place);
+      random = random * 1664525u + 1013904223u;
+      orb_placed_locate(&b.placed, v, s, (int32_t)((random >> 8) % (unsigned)b.shape[s].mesh.triangle_count));
+      assert_int_equal(b.placed.spot[2 * v + s].h / 3, place.triangle);
+      for (int k = 0; k < 3; k++) {
+        double at = 0;
+        for (int i = 0; i < 3; i++) {
+          int32_t corner = b.shape[s].mesh.triangles[3 * place.triangle + i];
+          at += place.at[i] * b.shape[s].mesh.positions[3 * corner + k] / b.diagonal[s];
+        }
+        assert_true(fabs(orb_placed_position(&b.placed, v, s)[k] - at) <= 1e-14);
+      }
+    }
+  }
+  tear_down(&b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(repair_keeps_the_limit),
@@ -371,6 +423,8 @@ int main(void) {
       cmocka_unit_test(thinned_shapes_give_a_start),
       cmocka_unit_test(resolving_can_be_refined),
       cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
+      cmocka_unit_test(edges_are_within_as_traced),
+      cmocka_unit_test(vertices_are_located_from_anywhere),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -211,6 +211,33 @@ static double items_in_fan2(const orb_placed_net *placed, int32_t list, const in
   return greatest;
 }
 
+/* Whether the new edges are within the limit, the one that a guess finds worst first: most collapses fail at it. */
+static int edges_allow(const collapser *c, const int32_t *ring, int n) {
+  const orb_placed_net *placed = c->placed;
+  int worst = -1;
+  int32_t shape = 0;
+  double most = -1;
+  for (int i = 2; i + 1 < n; i++) {
+    for (int32_t s = 0; s < placed->shape_count; s++) {
+      double guess2 = orb_placed_edge_guess2(placed, s, ring[0], ring[i]);
+      if (guess2 > most) {
+        most = guess2;
+        worst = i;
+        shape = s;
+      }
+    }
+  }
+  if (worst >= 0 && !(orb_placed_edge_within2(placed, shape, ring[0], ring[worst], c->limit2) <= c->limit2)) {
+    return 0;
+  }
+  for (int i = 2; i + 1 < n; i++) {
+    if (!orb_placed_edge_is_within(placed, ring[0], ring[i], c->limit2)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
 static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n) {
   const orb_placed_net *placed = c->placed;
   const orb_net *net = &placed->net;
@@ -227,22 +254,13 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
   if (shared != 2) {
     return 0;
   }
-  const double *v = orb_net_point(net, ring[0]);
   for (int i = 1; i + 1 < n; i++) {
-    if (orb_orient(v, orb_net_point(net, ring[i]), orb_net_point(net, ring[i + 1])) <= 0 ||
-        !orb_net_clearly_positive(net, ring[0], ring[i], ring[i + 1])) {
+    if (!orb_net_clearly_positive(net, ring[0], ring[i], ring[i + 1])) {
       return 0;
     }
   }
-  if (c->strict && !shape_allows(placed, u, ring, n)) {
-    return 0;
-  }
-  for (int i = 2; i + 1 < n; i++) {
-    if (!orb_placed_edge_is_within(placed, ring[0], ring[i], c->limit2)) {
-      return 0;
-    }
-  }
-  if (items_in_fan2(placed, placed->vertex_items[u], ring, n, c->limit2) > c->limit2) {
+  if (!edges_allow(c, ring, n) || (c->strict && !shape_allows(placed, u, ring, n)) ||
+      items_in_fan2(placed, placed->vertex_items[u], ring, n, c->limit2) > c->limit2) {
     return 0;
   }
   int32_t first = net->out[u], h = first;

@@ -65,8 +65,7 @@ static int items_allow(const hole *h, int i, int k, int j) {
 }
 
 static double triangle_cost(const hole *h, int i, int k, int j) {
-  if (orb_orient(point(h, i), point(h, k), point(h, j)) <= 0 ||
-      !orb_net_clearly_positive(&h->placed->net, h->ring[i], h->ring[k], h->ring[j]) || !items_allow(h, i, k, j)) {
+  if (!orb_net_clearly_positive(&h->placed->net, h->ring[i], h->ring[k], h->ring[j]) || !items_allow(h, i, k, j)) {
     return INFINITY;
   }
   orb_form form = orb_placed_form(h->placed, h->ring[i], h->ring[k], h->ring[j]);

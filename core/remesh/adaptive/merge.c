@@ -162,11 +162,8 @@ static double guess_at(const pair *s, double way) {
 
 static int is_positive(const pair *s) {
   const orb_net *net = &s->placed->net;
-  const double *p = orb_net_point(net, s->p);
   for (int i = 0; i < s->n; i++) {
-    int32_t a = s->ring[i], b = s->ring[(i + 1) % s->n];
-    if (orb_orient(p, orb_net_point(net, a), orb_net_point(net, b)) <= 0 ||
-        !orb_net_clearly_positive(net, s->p, a, b)) {
+    if (!orb_net_clearly_positive(net, s->p, s->ring[i], s->ring[i + 1 < s->n ? i + 1 : 0])) {
       return 0;
     }
   }

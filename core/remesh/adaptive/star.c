@@ -153,8 +153,7 @@ static int is_possible(const disc *d, side *over) {
   const orb_net *net = &d->placed->net;
   if (!over->possible) {
     int32_t a = net->triangles[over->h], b = net->triangles[orb_next(over->h)];
-    over->possible = orb_orient(orb_net_point(net, d->p), orb_net_point(net, a), orb_net_point(net, b)) > 0 &&
-                     orb_net_clearly_positive(net, d->p, a, b);
+    over->possible = orb_net_clearly_positive(net, d->p, a, b);
   }
   return over->possible;
 }

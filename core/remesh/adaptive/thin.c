@@ -137,8 +137,7 @@ static int is_allowed(const thinner *t, int32_t u, const int32_t *edge, int n, i
     if (a == v || b == v) {
       continue;
     }
-    if (orb_orient(orb_net_point(net, v), orb_net_point(net, a), orb_net_point(net, b)) <= 0 ||
-        !orb_net_clearly_positive(net, v, a, b)) {
+    if (!orb_net_clearly_positive(net, v, a, b)) {
       return 0;
     }
   }

@@ -84,11 +84,9 @@ static int can_flip(const orb_placed_net *placed, int32_t h, double limit2) {
   int32_t g = net->twin[h];
   int32_t a = net->triangles[h], b = net->triangles[g];
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
-  if (!orb_net_can_flip(net, h) || flip_inverts(placed, a, b, c, d)) {
-    return 0;
-  }
-  return limit2 == INFINITY ||
-         (orb_placed_edge_is_within(placed, c, d, limit2) && orb_placed_flip_items2(placed, h) <= limit2);
+  int is_free = limit2 == INFINITY;
+  return orb_net_can_flip(net, h) && (is_free || orb_placed_edge_is_within(placed, c, d, limit2)) &&
+         !flip_inverts(placed, a, b, c, d) && (is_free || orb_placed_flip_items2(placed, h) <= limit2);
 }
 
 int orb_placed_try_flip(orb_placed_net *placed, int32_t h, double limit2) {

@@ -162,27 +162,27 @@ static void put_item_at(orb_placed_net *placed, int32_t item, int32_t v) {
   placed->vertex_items[v] = item;
 }
 
-/* Locates net vertex v on shape s, starting at triangle `hint`. */
-static void locate_vertex(orb_placed_net *placed, int32_t v, int32_t s, int32_t hint) {
+void orb_placed_locate(orb_placed_net *placed, int32_t v, int32_t s, int32_t hint) {
   const double *p = orb_net_point(&placed->net, v);
-  orb_place place;
-  orb_hit hit = orb_locate_hit(placed->job->locator[s], p, hint, &place);
   int64_t cell = (int64_t)v * placed->shape_count + s;
-  placed->spot[cell] = orb_spot_of(&hit);
+  orb_place place = {.triangle = hint};
+  if (hint >= 0 && orb_pack_locate(&placed->pack[s], &placed->view[s], p, &place)) {
+    placed->spot[cell] = (orb_spot){3 * place.triangle, ORB_SPOT_FACE};
+  } else {
+    orb_hit hit = orb_locate_hit(placed->job->locator[s], p, hint, &place);
+    placed->spot[cell] = orb_spot_of(&hit);
+  }
   double *at = placed->at + 3 * cell, *normal = placed->normal + 3 * cell;
   at[0] = at[1] = at[2] = normal[0] = normal[1] = normal[2] = 0;
   for (int k = 0; k < 3; k++) {
-    int64_t corner = placed->view[s].triangles[3 * place.triangle + k];
+    int64_t corner = placed->view[s].triangles[3 * (int64_t)place.triangle + k];
+    const double *x = placed->pack[s].vertex[corner].position, *n = placed->vertex_normal[s] + 3 * corner;
     for (int j = 0; j < 3; j++) {
-      at[j] += place.at[k] * placed->position[s][3 * corner + j];
-      normal[j] += place.at[k] * placed->vertex_normal[s][3 * corner + j];
+      at[j] += place.at[k] * x[j];
+      normal[j] += place.at[k] * n[j];
     }
   }
   (void)orb_normalize(normal);
-}
-
-void orb_placed_locate_on(orb_placed_net *placed, int32_t v, int32_t s) {
-  locate_vertex(placed, v, s, placed->spot[(int64_t)v * placed->shape_count + s].h / 3);
 }
 
 void orb_placed_copy_vertex(orb_placed_net *placed, int32_t to, int32_t from) {
@@ -206,7 +206,7 @@ static void locate_range(void *arg, int64_t begin, int64_t end, int thread) {
     double apart2 = v > begin ? orb_distance2(p, p - 3) : INFINITY;
     for (int32_t s = 0; s < placed->shape_count; s++) {
       int near = apart2 * placed->view[s].triangle_count < 50;
-      locate_vertex(placed, (int32_t)v, s, near ? placed->spot[(v - 1) * placed->shape_count + s].h / 3 : -1);
+      orb_placed_locate(placed, (int32_t)v, s, near ? placed->spot[(v - 1) * placed->shape_count + s].h / 3 : -1);
     }
   }
 }
@@ -362,7 +362,7 @@ int32_t orb_placed_split(orb_placed_net *placed, int32_t h, const double p[3]) {
   }
   for (int32_t s = 0; s < placed->shape_count; s++) {
     int32_t near = placed->spot[(int64_t)beside * placed->shape_count + s].h / 3;
-    locate_vertex(placed, v, s, near);
+    orb_placed_locate(placed, v, s, near);
   }
   int32_t t = h / 3;
   placed->triangle_items[h / 3] = placed->triangle_items[g / 3] = -1;
@@ -382,8 +382,8 @@ int32_t orb_placed_insert(orb_placed_net *placed, int32_t t, const double p[3]) 
     return v;
   }
   for (int32_t s = 0; s < placed->shape_count; s++) {
-    locate_vertex(placed, v, s,
-                  placed->spot[(int64_t)net->triangles[3 * (int64_t)near] * placed->shape_count + s].h / 3);
+    orb_placed_locate(placed, v, s,
+                      placed->spot[(int64_t)net->triangles[3 * (int64_t)near] * placed->shape_count + s].h / 3);
   }
   placed->triangle_items[hit.triangle] = -1;
   if (other >= 0) {

@@ -71,8 +71,13 @@ void orb_placed_assign(orb_placed_net *placed, int32_t list, int32_t start);
 /* The same where the given triangles hold all the items. Touches only these triangles: others may change meanwhile. */
 void orb_placed_assign_among(orb_placed_net *placed, int32_t list, const int32_t *triangles, int count);
 
-/* Computes spot, position and normal of v on shape s from the vertex's point, starting from its old spot. */
-void orb_placed_locate_on(orb_placed_net *placed, int32_t v, int32_t s);
+/* Computes spot, position and normal of v on shape s from the vertex's point, starting at triangle `hint`; −1: none is
+ * known. */
+void orb_placed_locate(orb_placed_net *placed, int32_t v, int32_t s, int32_t hint);
+/* The same, starting from its old spot. */
+static inline void orb_placed_locate_on(orb_placed_net *placed, int32_t v, int32_t s) {
+  orb_placed_locate(placed, v, s, placed->spot[(int64_t)v * placed->shape_count + s].h / 3);
+}
 
 /* Copies a vertex's point, spots, positions and normals over those of another, or of the number after the last. */
 void orb_placed_copy_vertex(orb_placed_net *placed, int32_t to, int32_t from);

@@ -49,7 +49,12 @@ static int64_t count_rims(const orb_remesh_job *job) {
 }
 
 int orb_rims_any(const orb_remesh_job *job) {
-  return count_rims(job) > 0;
+  const orb_mesh *mesh = &job->shapes[0].mesh;
+  int32_t filled = 0;
+  for (int32_t t = 0; mesh->source_triangle && t < mesh->triangle_count; t++) {
+    filled += mesh->source_triangle[t] == ORB_MADE_FILL;
+  }
+  return filled > 0 && filled < mesh->triangle_count; /* the surface is in one piece, so the two parts meet */
 }
 
 /* Only adaptive moves vertices of its own; the other methods keep those of the shapes. */

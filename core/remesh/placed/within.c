@@ -47,6 +47,96 @@ static double trace_within2(orb_arc_tracer *t, const orb_pack *pack, const chord
   return greatest;
 }
 
+/* Where an arc is: it entered the triangle of h over h, from the left end of h to its right. */
+typedef struct stand {
+  int32_t h;
+  const orb_pack_vertex *left, *right;
+  double of_left, of_right; /* their distances from the plane of the arc; left is positive */
+} stand;
+
+/* The distance of a vertex from the plane of the arc; NAN where rounding might have changed its sign. */
+static inline double side_of(const orb_arc_tracer *t, const orb_pack_vertex *v) {
+  double u[3];
+  orb_sub(v->point, t->p, u);
+  double d = orb_dot(t->normal, u);
+  return fabs(d) > 1e-15 * t->size * (fabs(u[0]) + fabs(u[1]) + fabs(u[2])) + 1e-220 ? d : NAN;
+}
+
+static inline int ends_in(const orb_arc_tracer *t, int32_t triangle) {
+  const int32_t *c = t->mesh->triangles + 3 * (int64_t)triangle;
+  return triangle == t->target[0] || triangle == t->target[1] || c[0] == t->vertex || c[1] == t->vertex ||
+         c[2] == t->vertex;
+}
+
+enum { ENDS, LEAVES, UNCLEAR };
+
+/* The first step from within a face. */
+static int leave_face(const orb_arc_tracer *t, const orb_pack *pack, int32_t triangle, stand *out) {
+  const int32_t *c = t->mesh->triangles + 3 * (int64_t)triangle;
+  const orb_pack_vertex *v[3];
+  double d[3];
+  if (ends_in(t, triangle)) {
+    return ENDS;
+  }
+  for (int k = 0; k < 3; k++) {
+    v[k] = &pack->vertex[c[k]];
+    d[k] = side_of(t, v[k]);
+  }
+  for (int k = 0; k < 3; k++) {
+    int next = k < 2 ? k + 1 : 0;
+    if (d[k] < 0 && d[next] > 0) {
+      *out = (stand){t->mesh->twin[3 * triangle + k], v[next], v[k], d[next], d[k]};
+      return LEAVES;
+    }
+  }
+  return UNCLEAR;
+}
+
+/* The first step from a vertex, which h leaves. */
+static int leave_vertex(const orb_arc_tracer *t, const orb_pack *pack, int32_t first, stand *out) {
+  const int32_t *corner = t->mesh->triangles, *twin = t->mesh->twin;
+  int32_t h = first;
+  const orb_pack_vertex *right = &pack->vertex[corner[orb_next(h)]];
+  double of_right = side_of(t, right);
+  do {
+    const orb_pack_vertex *left = &pack->vertex[corner[orb_prev(h)]];
+    double of_left = side_of(t, left);
+    if (of_right < 0 && of_left > 0) {
+      *out = (stand){twin[orb_next(h)], left, right, of_left, of_right};
+      return ends_in(t, h / 3) ? ENDS : LEAVES;
+    }
+    right = left;
+    of_right = of_left;
+    h = twin[orb_prev(h)];
+  } while (h != first);
+  return UNCLEAR;
+}
+
+/* Follows the arc over the edges that it crosses. */
+static double walk_within2(orb_arc_tracer *t, const orb_pack *pack, const chord *e, double limit2, stand at) {
+  double greatest = segment_within2(e, at.left, at.right, at.of_left, at.of_right, limit2);
+  for (int i = 0; i < STEPS_MOST && greatest <= limit2; i++) {
+    orb_pack_step step = pack->step[at.h];
+    int32_t triangle = at.h / 3;
+    if (triangle == t->target[0] || triangle == t->target[1] || step.apex == t->vertex) {
+      return greatest;
+    }
+    const orb_pack_vertex *apex = &pack->vertex[step.apex];
+    double of_apex = side_of(t, apex);
+    if (of_apex > 0) {
+      at = (stand){step.over[0], apex, at.right, of_apex, at.of_right};
+    } else if (of_apex < 0) {
+      at = (stand){step.over[1], at.left, apex, at.of_left, of_apex};
+    } else {
+      break;
+    }
+    greatest = fmax(greatest, segment_within2(e, at.left, at.right, at.of_left, at.of_right, limit2));
+  }
+  t->state = ORB_TRACE_ENTERED;
+  t->h = at.h;
+  return trace_within2(t, pack, e, limit2, greatest);
+}
+
 double orb_placed_edge_within2(const orb_placed_net *placed, int32_t s, int32_t v, int32_t w, double limit2) {
   const orb_pack *pack = &placed->pack[s];
   orb_spot from = placed->spot[(int64_t)v * placed->shape_count + s],
@@ -57,49 +147,13 @@ double orb_placed_edge_within2(const orb_placed_net *placed, int32_t s, int32_t 
   chord e = {.a = orb_placed_position(placed, v, s), .b = orb_placed_position(placed, w, s)};
   orb_sub(e.b, e.a, e.ab);
   e.by_length2 = 1 / orb_dot(e.ab, e.ab);
-  const double *p = orb_net_point(&placed->net, v);
   orb_arc_tracer t;
-  orb_crossing crossing;
-  orb_trace_between(&t, &placed->view[s], from, p, to, orb_net_point(&placed->net, w));
-  if (!orb_trace_next(&t, &crossing)) {
-    return 0;
-  }
-  double greatest = crossing_within2(pack, t.mesh, &e, &crossing);
-  if (crossing.at_vertex) {
-    return trace_within2(&t, pack, &e, limit2, greatest);
-  }
-  int32_t h = t.h; /* entered over h, from its left end to its right */
-  const orb_pack_vertex *left = &pack->vertex[t.mesh->triangles[h]];
-  const orb_pack_vertex *right = &pack->vertex[t.mesh->triangles[orb_next(h)]];
-  double u[3];
-  orb_sub(left->point, p, u);
-  double of_left = orb_dot(t.normal, u);
-  orb_sub(right->point, p, u);
-  double of_right = orb_dot(t.normal, u);
-  for (int i = 0; i < STEPS_MOST && greatest <= limit2; i++) {
-    orb_pack_step step = pack->step[h];
-    int32_t triangle = h / 3;
-    if (triangle == t.target[0] || triangle == t.target[1] || step.apex == t.vertex) {
-      return greatest;
-    }
-    const orb_pack_vertex *apex = &pack->vertex[step.apex];
-    orb_sub(apex->point, p, u);
-    double of_apex = orb_dot(t.normal, u);
-    if (!(fabs(of_apex) > 1e-15 * t.size * (fabs(u[0]) + fabs(u[1]) + fabs(u[2])) + 1e-220)) {
-      break;
-    }
-    if (of_apex > 0) {
-      left = apex;
-      of_left = of_apex;
-      h = step.over[0];
-    } else {
-      right = apex;
-      of_right = of_apex;
-      h = step.over[1];
-    }
-    double distance2 = segment_within2(&e, left, right, of_left, of_right, limit2);
-    greatest = distance2 > greatest ? distance2 : greatest;
-  }
-  t.h = h;
-  return trace_within2(&t, pack, &e, limit2, greatest);
+  orb_trace_between(&t, &placed->view[s], from, orb_net_point(&placed->net, v), to, orb_net_point(&placed->net, w));
+  stand at;
+  int way = from.kind == ORB_SPOT_FACE     ? leave_face(&t, pack, from.h / 3, &at)
+            : from.kind == ORB_SPOT_VERTEX ? leave_vertex(&t, pack, from.h, &at)
+                                           : UNCLEAR;
+  return way == ENDS     ? 0
+         : way == LEAVES ? walk_within2(&t, pack, &e, limit2, at)
+                         : trace_within2(&t, pack, &e, limit2, 0);
 }
