@@ -506,13 +506,14 @@ test('a kept document: the new targets, in the scene, after those that it had', 
       primitive.targets.unshift({ POSITION: primitive.attributes.POSITION });
       body.extras = { targetNames: ['smile', 'other'], firstShape: 1 };
       gltf.meshes.unshift({ primitives: [{ attributes: primitive.attributes, indices: primitive.indices }] });
-      gltf.nodes = [{ mesh: 1, scale: [-2, 1, 1], translation: [0, 5, 0] }];
+      gltf.nodes = [{ mesh: 1, scale: [-2, 1, 1], translation: [0, 5, 0], weights: [0.25, 0] }];
     },
   });
   const bytes = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.length);
-  const { names, targets, position, index, frame, normal } = mesh.decodeMorph(bytes, 2);
-  assert.deepEqual(names, ['other']);
-  assert.equal(targets.length, 1);
+  const { names, targets, extras, position, index, frame, normal } = mesh.decodeMorph(bytes, 2);
+  assert.deepEqual(names, ['other', 'smile']);
+  assert.equal(targets.length, 2);
+  assert.deepEqual(extras, [{ name: 'smile', at: 1, target: 0, weight: 0.25 }]);
   const close = (a, b) =>
     assert.ok(
       [...a].every((x, i) => Math.abs(x - b[i]) < 1e-6),
@@ -533,6 +534,34 @@ test('a kept document: the new targets, in the scene, after those that it had', 
     'a mirror turns the triangles',
   );
   close(normal, [0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1]);
+});
+
+test('looks: the variants of a document, and its own materials if no variant has them', () => {
+  const glb = (mappings) =>
+    writeGlb({
+      positions: TETRAHEDRON,
+      triangles: FACES,
+      moves: TETRAHEDRON,
+      edit: (gltf) => {
+        gltf.materials = ['blue', 'red'].map((name) => ({ name }));
+        gltf.extensions = { KHR_materials_variants: { variants: [{ name: 'day' }, { name: 'night' }] } };
+        Object.assign(gltf.meshes[0].primitives[0], {
+          material: 0,
+          extensions: { KHR_materials_variants: { mappings } },
+        });
+      },
+    });
+  const looks = (mappings) => {
+    const file = glb(mappings);
+    return mesh.decodeMorph(file.buffer.slice(file.byteOffset, file.byteOffset + file.length), 2).looks;
+  };
+  const variants = [
+    { name: 'day', variant: 0 },
+    { name: 'night', variant: 1 },
+  ];
+  assert.deepEqual(looks([{ material: 1, variants: [1] }]), variants, 'day has the own material');
+  assert.deepEqual(looks([{ material: 0, variants: [0] }]), variants);
+  assert.deepEqual(looks([{ material: 1, variants: [0, 1] }]), [{ name: 'As in the file', variant: -1 }, ...variants]);
 });
 
 test('another match: it flips if limbs change sides, and neither stay nor trade with head or tail', () => {

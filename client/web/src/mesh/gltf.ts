@@ -23,6 +23,7 @@ interface Primitive {
 }
 interface Node {
   mesh?: number;
+  weights?: number[];
   skin?: number;
   children?: number[];
   matrix?: number[];

@@ -3,10 +3,28 @@ import { dressOf, skinOf, tried, type Skin } from './dress';
 import { type Gltf, type Part, readGlb } from './gltf';
 import { edgesOf, smoothNormals, type Frame } from './geometry';
 
+/** What the materials of a morph can look like. variant: of the asset's materials; −1: those of its primitives. */
+export interface Look {
+  name: string;
+  variant: number;
+}
+
+/** A target that is no shape: it came with a file. */
+export interface Extra {
+  name: string;
+  /** among the targets of MorphData */
+  at: number;
+  /** among the targets of the primitives */
+  target: number;
+  /** the weight that the asset gives it */
+  weight: number;
+}
+
 export interface MorphData {
   names: string[];
-  /** the names of the variants of its materials, the first shape's own first; empty without variants */
-  looks: string[];
+  /** empty where there is nothing to choose from */
+  looks: Look[];
+  extras: Extra[];
   vertices: number;
   triangles: number;
   frame: Frame;
@@ -101,23 +119,36 @@ function joinedIndex(parts: Moving[]): Uint32Array {
   return index;
 }
 
-/** The parts with the materials of a variant. */
-const dressedAs = (parts: Moving[], look: number): Moving[] =>
-  parts.map((part) => {
-    const { mappings = [] } = part.primitive.extensions?.KHR_materials_variants ?? {};
-    const material = mappings.find(({ variants }) => variants.includes(look))?.material ?? part.primitive.material;
-    return { ...part, primitive: { ...part.primitive, material } };
-  });
+/** The material of a part in a variant. */
+const materialIn = ({ primitive }: Moving, variant: number) =>
+  primitive.extensions?.KHR_materials_variants?.mappings?.find(({ variants }) => variants.includes(variant))
+    ?.material ?? primitive.material;
+
+/** The variants of the materials, and before them those that the primitives name, unless the first variant has them. */
+function looksOf({ json }: Gltf, parts: Moving[]): Look[] {
+  const variants = json.extensions?.KHR_materials_variants?.variants ?? [];
+  const looks = variants.map(({ name }, variant) => ({ name, variant }));
+  const isOwn = parts.every((part) => materialIn(part, 0) === part.primitive.material);
+  return isOwn || !looks.length ? looks : [{ name: 'As in the file', variant: -1 }, ...looks];
+}
+
+/** The parts with the materials of a look. */
+const dressedAs = (parts: Moving[], look: Look | undefined): Moving[] =>
+  parts.map((part) => ({ ...part, primitive: { ...part.primitive, material: materialIn(part, look?.variant ?? -1) } }));
 
 /**
- * Targets 0 … shapeCount − 2 are the other shapes; the rest are in-betweens of a curved path, and those that came with
- * the files. look: the variant of the materials.
+ * Targets 0 … shapeCount − 2 are the other shapes. In-betweens of a curved path follow, then the targets that came with
+ * the files: `carried` of them, and last those that an uploaded document had before the shapes. look: one of its looks.
  */
-export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0): MorphData {
+export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0, carried = 0): MorphData {
   const gltf = readGlb(buffer);
-  const parts = dressedAs(movingParts(gltf), look);
-  if (!parts.length) throw new Error('The asset has no triangles.');
-  const targetCount = (parts[0].primitive.targets?.length ?? 0) - parts[0].first;
+  const bare = movingParts(gltf);
+  if (!bare.length) throw new Error('The asset has no triangles.');
+  const looks = looksOf(gltf, bare);
+  const parts = dressedAs(bare, looks[look]);
+  const had = parts[0].first;
+  const fresh = (parts[0].primitive.targets?.length ?? 0) - had;
+  const targetCount = fresh + had;
   const position = joined(parts.map((p) => inScene(p.position, p.matrix, 1)));
   const index = joinedIndex(parts);
   const hasNormals = parts.every((p) => p.primitive.attributes.NORMAL !== undefined);
@@ -125,7 +156,7 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0): 
     ? joined(parts.map((p) => normalsInScene(gltf.floats(p.primitive.attributes.NORMAL), null, p.matrix)))
     : smoothNormals(position, index);
   const targets = Array.from({ length: targetCount }, (_, k) => {
-    const of = (p: Moving) => p.primitive.targets![p.first + k];
+    const of = (p: Moving) => p.primitive.targets![targetAt(k, had, fresh)];
     const delta = joined(parts.map((p) => inScene(gltf.floats(of(p).POSITION), p.matrix, 0)));
     const withNormals = hasNormals && parts.every((p) => of(p).NORMAL !== undefined);
     const there = withNormals
@@ -143,15 +174,20 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0): 
   });
 
   const dress = tried(() => dressOf(gltf, parts));
-  const shapes = Array.from({ length: Math.min(shapeCount, targetCount + 1) }, (_, i) => single(i - 1, targetCount));
-  const path = animationPath(gltf, parts[0].first, targetCount, shapes);
-  const names = targetNames(gltf, parts[0], targetCount);
+  const shapes = Array.from({ length: Math.min(shapeCount, fresh + 1) }, (_, i) => single(i - 1, targetCount));
+  const path = animationPath(gltf, had, fresh, shapes);
+  const names = targetNames(gltf, parts[0], targetCount, (k) => targetAt(k, had, fresh));
+  const extras = names.flatMap((name, at) => {
+    const target = targetAt(at, had, fresh);
+    return at < fresh - carried ? [] : [{ name, at, target, weight: weightOf(gltf, parts[0].mesh, target) }];
+  });
   const frame = fit(position, targets, shapes);
   for (let i = 0; i < position.length; i++) position[i] = (position[i] - frame.center[i % 3]) / frame.radius;
   for (const target of targets) for (let i = 0; i < position.length; i++) target.position[i] /= frame.radius;
   return {
     names,
-    looks: (gltf.json.extensions?.KHR_materials_variants?.variants ?? []).map(({ name }) => name),
+    looks,
+    extras,
     vertices: position.length / 3,
     triangles: index.length / 3,
     frame,
@@ -167,9 +203,18 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0): 
   };
 }
 
-function targetNames(gltf: Gltf, { mesh, first }: Moving, count: number): string[] {
+/** The number in the primitives of a target of MorphData, where those that a document `had` come last. */
+const targetAt = (k: number, had: number, fresh: number) => (k < fresh ? had + k : k - fresh);
+
+function targetNames(gltf: Gltf, { mesh }: Moving, count: number, at: (k: number) => number): string[] {
   const names = gltf.json.meshes?.[mesh]?.extras?.targetNames;
-  return Array.from({ length: count }, (_, k) => names?.[first + k] ?? `target ${k + 1}`);
+  return Array.from({ length: count }, (_, k) => names?.[at(k)] ?? `target ${k + 1}`);
+}
+
+/** The weight of a target at rest. */
+function weightOf({ json }: Gltf, mesh: number, target: number): number {
+  const own = json.nodes?.find((node) => node.mesh === mesh)?.weights;
+  return (own ?? json.meshes?.[mesh]?.weights)?.[target] ?? 0;
 }
 
 /** The frame that contains every shape. */
@@ -223,19 +268,21 @@ export function pathOf(
   return straight;
 }
 
-/** The animation of the morph is the last: those of an uploaded document come before it, with `first` targets more. */
-function animationPath(gltf: Gltf, first: number, count: number, shapes: Float32Array[]) {
+/** The animation of the morph is the last: those of an uploaded document come before it. The targets that it `had` rest. */
+function animationPath(gltf: Gltf, had: number, count: number, shapes: Float32Array[]) {
   for (const animation of (gltf.json.animations ?? []).slice(-1)) {
     const channel = animation.channels.find((c) => c.target.path === 'weights');
     if (!channel || !count) continue;
     const sampler = animation.samplers[channel.sampler];
     const output = gltf.floats(sampler.output);
     const step = sampler.interpolation === 'CUBICSPLINE' ? 3 : 1;
-    const width = first + count;
+    const width = had + count;
     const keys = Math.floor(output.length / (width * step));
     const frames = Array.from({ length: keys }, (_, i) => {
-      const from = (i * step + (step === 3 ? 1 : 0)) * width + first;
-      return output.slice(from, from + count);
+      const from = (i * step + (step === 3 ? 1 : 0)) * width + had;
+      const frame = new Float32Array(width);
+      frame.set(output.subarray(from, from + count));
+      return frame;
     });
     return pathOf(frames, shapes);
   }

@@ -219,8 +219,9 @@ const ops = {
     return { lines, points, triangles: Float32Array.from(flat), found };
   },
 
-  async morph(key: string, buffer: ArrayBuffer, shapeCount: number, look = 0): Promise<MorphData> {
-    const data = decodeMorph(buffer, shapeCount, look);
+  /** carried: how many targets the asset got from the files */
+  async morph(key: string, buffer: ArrayBuffer, shapeCount: number, look = 0, carried = 0): Promise<MorphData> {
+    const data = decodeMorph(buffer, shapeCount, look, carried);
     morphs.clear();
     morphs.set(key, {
       ...data,
