@@ -37,20 +37,24 @@ struct Unpacker {
   }
 
   /* The values as components of a type, `stride` bytes an element. */
-  Packed::Octets bytes_of(const Packed::Values &values, int64_t type, size_t stride) const {
+  Packed::Octets bytes_of(const Packed::Values &values, int64_t type, bool normalized, size_t stride) const {
     const size_t size = static_cast<size_t>(component_size(type));
+    const double most = component_most(type), least = type == 5120 || type == 5122 ? -most - 1 : 0;
     Packed::Octets out(values.list.size() / values.width * stride, 0, Charged<unsigned char>(ctx));
     for (size_t i = 0; i < values.list.size(); i++) {
       unsigned char *at = &out[i / values.width * stride + i % values.width * size];
-      const double value = values.list[i];
+      const double value = normalized ? std::round(values.list[i] * most) : values.list[i];
       if (type == ORB_GLTF_FLOAT) {
-        const float number = static_cast<float>(value);
+        const float number = static_cast<float>(values.list[i]);
         std::memcpy(at, &number, sizeof number);
-      } else {
-        const int64_t number = static_cast<int64_t>(value);
-        for (size_t b = 0; b < size; b++) { /* little-endian, two's complement */
-          at[b] = static_cast<unsigned char>(static_cast<uint64_t>(number) >> (8 * b) & 255);
-        }
+        continue;
+      }
+      if (!(value >= least && value <= most) || value != std::floor(value)) {
+        malformed("A compressed glTF primitive has values that its accessors cannot hold.");
+      }
+      const uint64_t number = static_cast<uint64_t>(static_cast<int64_t>(value));
+      for (size_t b = 0; b < size; b++) { /* little-endian, two's complement */
+        at[b] = static_cast<unsigned char>(number >> (8 * b) & 255);
       }
     }
     return out;
@@ -82,13 +86,16 @@ struct Unpacker {
     }
     const size_t tight = values->width * static_cast<size_t>(component_size(type));
     const size_t stride = is_attribute ? (tight + 3) / 4 * 4 : tight; /* glTF aligns the attributes of vertices */
-    const Packed::Octets bytes = bytes_of(*values, type, stride);
+    const bool normalized = cJSON_IsTrue(member(accessor, "normalized"));
+    const Packed::Octets bytes = bytes_of(*values, type, normalized, stride);
     const int64_t view = editor->add_view(bytes.data(), bytes.size(),
                                           is_attribute ? ORB_GLTF_ARRAY_BUFFER : ORB_GLTF_ELEMENT_ARRAY_BUFFER,
                                           stride == tight ? 0 : stride);
     set(accessor, "bufferView", static_cast<double>(view));
     cJSON_DeleteItemFromObjectCaseSensitive(accessor, "byteOffset");
-    bound(*values, accessor);
+    if (!normalized) {
+      bound(*values, accessor);
+    }
   }
 
   void plain_primitive(cJSON *primitive) {

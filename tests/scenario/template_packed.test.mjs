@@ -163,7 +163,8 @@ test('positions compressed by meshoptimizer', async (t) => {
 test('positions compressed by Draco', { skip: !existsSync(encoder) }, async (t) => {
   const d = await daemon(t);
   const egg = shapes.egg(3);
-  const { glb } = await draco({ ...egg, positions: egg.positions.map((p) => p.map((x) => x / 2)) });
+  const colors = egg.positions.map((_, v) => [v % 256, v >> 8, 255 - (v % 256), 255]);
+  const { glb } = await draco({ ...egg, colors, positions: egg.positions.map((p) => p.map((x) => x / 2)) });
   const asset = await assetOf(d, glb, UNPACKED);
   const { gltf, read } = parseGlb(asset);
   const before = jsonOf(glb);
@@ -177,6 +178,11 @@ test('positions compressed by Draco', { skip: !existsSync(encoder) }, async (t) 
   const [primitive] = gltf.meshes[0].primitives;
   assert.deepEqual([...read(primitive.attributes.POSITION)], [...positions], 'the values that Draco decodes');
   assert.equal(read(primitive.indices).length, 3 * egg.triangles.length);
+  const { componentType, normalized } = gltf.accessors[primitive.attributes.COLOR_0];
+  assert.deepEqual([componentType, normalized], [5121, true]);
+  const bytes = read(primitive.attributes.COLOR_0);
+  const rows = (list) => list.map((color) => color.join(' ')).sort(); // Draco sorts the vertices
+  assert.deepEqual(rows(colors.map((_, v) => [...bytes.slice(4 * v, 4 * v + 4)])), rows(colors));
   assertOnTarget(asset, positions);
 });
 
