@@ -94,25 +94,26 @@ function matrixOf({ matrix, translation: [tx, ty, tz] = [0, 0, 0], rotation = [0
   return matrix ?? [...columns.flatMap((column, c) => [...column.map((v) => v * scale[c]), 0]), tx, ty, tz, 1];
 }
 
-/** The matrix to the scene of the first node that shows each mesh. */
+/** The matrices to the scene of the nodes that show each mesh. */
 function matricesOf({ nodes = [], scenes, scene = 0 }) {
   const found = new Map();
   const below = new Set(nodes.flatMap(({ children = [] }) => children));
   const roots = scenes?.[scene]?.nodes ?? [...nodes.keys()].filter((node) => !below.has(node));
-  const stack = roots.map((node) => [node, matrixOf({}), 0]);
+  const stack = roots.map((node) => [node, matrixOf({}), 0]).reverse(); // the first one is on top
   while (stack.length) {
     const [node, above, depth] = stack.pop();
     if (!nodes[node] || depth > 64) continue;
     const to = times(above, matrixOf(nodes[node]));
-    if (nodes[node].mesh !== undefined && !found.has(nodes[node].mesh)) found.set(nodes[node].mesh, to);
-    for (const child of nodes[node].children ?? []) stack.push([child, to, depth + 1]);
+    const { mesh } = nodes[node];
+    if (mesh !== undefined) found.set(mesh, [...(found.get(mesh) ?? []), to]);
+    for (const child of [...(nodes[node].children ?? [])].reverse()) stack.push([child, to, depth + 1]);
   }
   return found;
 }
 
 /**
  * The primitives that morph, with those targets that are shapes: an uploaded document that has got targets may have
- * others first, and other meshes. variant: of the materials; extras: other targets, with weights that stay.
+ * others first. Its other meshes follow, which stay as they are. variant: of the materials; extras: other targets, with weights that stay.
  */
 function meshOf({ json, read }, variant, extras) {
   const kept = json.meshes.filter((mesh) => mesh.extras?.firstShape !== undefined);
@@ -123,16 +124,23 @@ function meshOf({ json, read }, variant, extras) {
     const mappings = p.extensions?.KHR_materials_variants?.mappings ?? [];
     return mappings.find(({ variants }) => variants.includes(variant))?.material ?? p.material;
   };
-  const primitives = meshes.flatMap((mesh) => {
-    const m = matrices.get(json.meshes.indexOf(mesh)) ?? matrixOf({});
-    return mesh.primitives.map((p) => ({
-      ...p,
-      material: dressed(p),
-      targets: p.targets?.slice(first),
-      still: extras.map(({ target, weight }) => ({ ...p.targets?.[target], weight })),
-      ...toScene(m, read),
-    }));
+  const placed = (mesh) => matrices.get(json.meshes.indexOf(mesh)) ?? [];
+  const morphing = (p, m) => ({
+    ...p,
+    material: dressed(p),
+    targets: p.targets?.slice(first),
+    still: extras.map(({ target, weight }) => ({ ...p.targets?.[target], weight })),
+    ...toScene(m, read),
   });
+  const staying = (p, m) => ({ ...p, material: dressed(p), targets: [], still: [], ...toScene(m, read) });
+  const isSurface = ({ mode = 4, attributes }) => mode === 4 && attributes.POSITION !== undefined;
+  const primitives = meshes.flatMap((mesh) => {
+    const [m = matrixOf({})] = placed(mesh);
+    return mesh.primitives.filter(isSurface).map((p) => morphing(p, m));
+  });
+  const others = kept.length ? json.meshes.filter((mesh) => !kept.includes(mesh)) : [];
+  for (const mesh of others)
+    for (const m of placed(mesh)) primitives.push(...mesh.primitives.filter(isSurface).map((p) => staying(p, m)));
   return { first, primitives };
 }
 
@@ -371,7 +379,7 @@ function frameOf(primitives, shapes) {
   for (const { attributes, targets = [], places, ways } of primitives) {
     const base = places(attributes.POSITION);
     for (let shape = 0; shape < shapes; shape++) {
-      const delta = shape ? ways(targets[shape - 1].POSITION) : null;
+      const delta = shape && targets.length ? ways(targets[shape - 1].POSITION) : null;
       for (let i = 0; i < base.length; i++) {
         const x = base[i] + (delta ? delta[i] : 0);
         if (x < low[i % 3]) low[i % 3] = x;
