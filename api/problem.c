@@ -180,6 +180,21 @@ static void topology_facts(const orb_error *error, api_text *out) {
   }
 }
 
+static void elements(const orb_error *error, api_text *out) {
+  api_json_member_integer(out, "element_count", error->element_total);
+  api_json_key(out, "elements");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < error->element_count; i++) {
+    api_json_open(out, '{');
+    api_json_member_string(out, "where", error->elements[i].where);
+    if (error->elements[i].name[0]) {
+      api_json_member_string(out, "name", error->elements[i].name);
+    }
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+}
+
 void api_problem_of_error(const orb_error *error, api_problem *problem) {
   api_refuse(problem, orb_status_name(error->status), "%s", error->detail);
   api_text *out = &problem->facts;
@@ -195,6 +210,12 @@ void api_problem_of_error(const orb_error *error, api_problem *problem) {
   }
   if (error->shape >= 0) {
     api_json_member_integer(out, "shape", error->shape);
+  }
+  if (error->transfer >= 0) {
+    api_json_member_integer(out, "transfer", error->transfer);
+  }
+  if (error->element_count > 0) {
+    elements(error, out);
   }
 }
 

@@ -12,7 +12,7 @@
 void orb_error_reset(orb_error *error) {
   memset(error, 0, offsetof(orb_error, loop_vertices)); /* these are as many as loop_start says */
   error->line = error->offset = error->boundary_loops = error->genus = -1;
-  error->shape = -1;
+  error->shape = error->transfer = -1;
 }
 
 void orb_error_clear(orb_context *ctx) {

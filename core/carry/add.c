@@ -4,10 +4,10 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "base/error.h"
 #include "base/memory.h"
 #include "carry/bake.h"
 #include "carry/carry.h"
+#include "carry/check.h"
 #include "carry/corners.h"
 #include "format/gltf_add.h"
 #include "mesh/dropped.h"
@@ -231,8 +231,7 @@ static orb_status bake_one(orb_context *ctx, const orb_carrier *carrier, int32_t
                       .resolution = carry->resolution};
   orb_status status = orb_bake(ctx, &job, baked);
   if (status != ORB_OK) {
-    orb_context_error_edit(ctx)->shape = carry->from;
-    return status;
+    return orb_carry_blame(ctx, status, carry->from, number);
   }
   orb_added_image *images = a->images[i] = ORB_NEW(ctx, orb_added_image, baked->image_count);
   if (!images) {
@@ -284,7 +283,11 @@ static orb_status add_to(orb_context *ctx, const orb_carrier *carrier, const int
   if (carrier->texture_count > 0) {
     ORB_GO(status, bake_textures(ctx, carrier, &charts, vertices, a, more), done);
   }
-  ORB_GO(status, orb_gltf_add(ctx, asset->data, asset->size, more, &made), done);
+  status = orb_gltf_add(ctx, asset->data, asset->size, more, &made);
+  if (status != ORB_OK) { /* of what can be refused there, orb_carry_check() has tried all but a second skin */
+    status = orb_carry_blame(ctx, status, 0, carrier->skin_carry);
+    goto done;
+  }
   orb_buffer_free(ctx, asset);
   *asset = made;
   made = (orb_buffer){0};

@@ -3,61 +3,11 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "base/error.h"
 #include "base/memory.h"
+#include "carry/check.h"
 #include "carry/sets.h"
 #include "carry/targets.h"
 #include "carry/texels.h"
-
-static const char *const names[] = {"skin", "color", "texcoord", "targets", "texture"};
-static const char *const titles[] = {"no skin on its closed surface", "no colours of vertices",
-                                     "no texture coordinates", "no morph targets", "no base colour texture"};
-
-const char *orb_carry_name(orb_carry_what what) {
-  return (unsigned)what < ORB_CARRY_COUNT ? names[what] : NULL;
-}
-
-static orb_status refuse(orb_context *ctx, const orb_carry *carry, const char *why) {
-  orb_status status = orb_fail(ctx, ORB_E_BAD_OPTION,
-                               "\"transfer\" takes \"%s\" from shape %d, which has %s. Leave it out, or name another "
-                               "shape.",
-                               orb_carry_name(carry->what), (int)carry->from, why);
-  orb_context_error_edit(ctx)->shape = carry->from;
-  return status;
-}
-
-static orb_status check_texture(orb_context *ctx, const orb_carry *carry, int32_t number) {
-  if (carry->from == 0) {
-    return orb_fail(ctx, ORB_E_BAD_OPTION,
-                    "Entry %d of \"transfer\" takes a texture from the first shape, whose materials the asset has "
-                    "already. Name a later shape.",
-                    (int)number);
-  }
-  if (carry->resolution != 0 && (carry->resolution < ORB_BAKE_LEAST || carry->resolution > ORB_BAKE_MOST)) {
-    return orb_fail(ctx, ORB_E_BAD_OPTION,
-                    "The resolution of entry %d of \"transfer\" is %d texels a side; %d to %d are possible.",
-                    (int)number, (int)carry->resolution, (int)ORB_BAKE_LEAST, (int)ORB_BAKE_MOST);
-  }
-  return ORB_OK;
-}
-
-static orb_status check(orb_context *ctx, const orb_carry_job *job) {
-  int32_t skins = 0;
-  for (int32_t i = 0; i < job->carry_count; i++) {
-    const orb_carry *carry = &job->carries[i];
-    if ((unsigned)carry->what >= ORB_CARRY_COUNT || carry->from < 0 || carry->from >= job->supermesh->shape_count ||
-        job->carry_count > ORB_CARRY_MAX) {
-      return orb_fail(ctx, ORB_E_BAD_OPTION, "Entry %d of \"transfer\" is out of range.", (int)i);
-    }
-    if (carry->what == ORB_CARRY_TEXTURE) {
-      ORB_TRY(check_texture(ctx, carry, i));
-    }
-    skins += carry->what == ORB_CARRY_SKIN;
-  }
-  return skins <= 1
-             ? ORB_OK
-             : orb_fail(ctx, ORB_E_BAD_OPTION, "An asset can have one skin; \"transfer\" asks for %d.", (int)skins);
-}
 
 static orb_status open_sets(orb_context *ctx, orb_carrier *out, int32_t number, orb_carry_source *source, int *has) {
   const orb_carry *carry = &out->job.carries[number];
@@ -117,7 +67,8 @@ static orb_status open_one(orb_context *ctx, orb_carrier *out, int32_t number) {
     status = open_sets(ctx, out, number, &source, &has);
   }
   orb_carry_source_close(ctx, &source);
-  return status == ORB_OK && !has ? refuse(ctx, carry, titles[carry->what]) : status;
+  return status == ORB_OK && !has ? orb_carry_refuse(ctx, job->carries, number)
+                                  : orb_carry_blame(ctx, status, carry->from, number);
 }
 
 static orb_status allocate(orb_context *ctx, orb_carrier *out) {
@@ -134,7 +85,7 @@ orb_status orb_carrier_open(orb_context *ctx, const orb_carry_job *job, orb_carr
   if (job->carry_count == 0) {
     return ORB_OK;
   }
-  ORB_TRY(check(ctx, job));
+  ORB_TRY(orb_carry_entries(ctx, job->carries, job->carry_count, job->supermesh->shape_count));
   ORB_TRY(allocate(ctx, out));
   ORB_TRY(orb_asset_transforms(ctx, job->supermesh, job->shapes, job->fit, out->moved, NULL));
   for (int32_t i = 0; i < job->carry_count; i++) {

@@ -14,22 +14,6 @@ const size_t CHECK_EVERY = 1u << 20; /* elements between two checks for cancella
 /* Components that may be decoded in all: exporters let 50 primitives share an accessor, not a thousand. */
 const size_t WORK_PER_BYTE = 32, WORK_OF_ANY = 4u << 20;
 
-int component_size(int64_t type) {
-  switch (type) {
-    case 5120:
-    case 5121:
-      return 1;
-    case 5122:
-    case 5123:
-      return 2;
-    case 5125:
-    case 5126:
-      return 4;
-    default:
-      malformed("A glTF accessor has an unknown component type.");
-  }
-}
-
 double component(const unsigned char *p, int64_t type, bool normalized) {
   switch (type) {
     case 5120: {
@@ -52,6 +36,22 @@ double component(const unsigned char *p, int64_t type, bool normalized) {
 }
 
 }  // namespace
+
+int component_size(int64_t type) {
+  switch (type) {
+    case 5120:
+    case 5121:
+      return 1;
+    case 5122:
+    case 5123:
+      return 2;
+    case 5125:
+    case 5126:
+      return 4;
+    default:
+      malformed("A glTF accessor has an unknown component type.");
+  }
+}
 
 void Buffers::spend(size_t work) const {
   if (work > work_left_) {

@@ -6,6 +6,9 @@
 
 namespace gltf {
 
+/* The bytes of a component. */
+int component_size(int64_t type);
+
 class Buffers {
  public:
   explicit Buffers(orb_context *ctx) : ctx_(ctx), packed_(ctx) {}
@@ -20,6 +23,8 @@ class Buffers {
   Bytes buffer(int64_t index) const {
     return index >= 0 && index < static_cast<int64_t>(buffers_.size()) ? buffers_[static_cast<size_t>(index)] : Bytes();
   }
+
+  const Packed &packed() const { return packed_; }
 
   /* Counts work: 1 is one component decoded. Refuses the file when it asks for more than its size justifies, which it
    * does by naming the same accessors over and over. */

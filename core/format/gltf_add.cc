@@ -91,7 +91,7 @@ struct Adder {
     const size_t from = 4 * static_cast<size_t>(block.first), count = 4 * block.count;
     for (const char *name : names) {
       if (member(attributes_of(block), name)) {
-        refuse_skin();
+        refuse_skin(block.mesh);
       }
     }
     int64_t joints = NONE;
@@ -109,19 +109,22 @@ struct Adder {
     set(attributes_of(block), names[1], static_cast<double>(weights));
   }
 
-  [[noreturn]] static void refuse_skin() {
+  [[noreturn]] void refuse_skin(size_t mesh) const {
     throw Fault{ORB_E_BAD_OPTION,
                 "The document of the first shape has a skin already, and a mesh can have one. Leave \"skin\" of "
-                "\"transfer\" out, or use another method than 'template'."};
+                "\"transfer\" out, or use another method than 'template'.",
+                {culprit("meshes", array_of(doc, "meshes"), mesh)}};
   }
 
   void add_skin() {
+    const List all = array_of(doc, "meshes");
     for (const Block &block : blocks) {
       if (std::memcmp(block.matrix.m, blocks[0].matrix.m, sizeof block.matrix.m) != 0) {
         throw Fault{
             ORB_E_BAD_OPTION,
             "The meshes of the first shape stand under nodes with different transforms, which one skeleton does "
-            "not fit. Leave \"skin\" of \"transfer\" out, or use another method than 'template'."};
+            "not fit. Leave \"skin\" of \"transfer\" out, or use another method than 'template'.",
+            {culprit("meshes", all, blocks[0].mesh), culprit("meshes", all, block.mesh)}};
       }
       add_weights(block);
     }
@@ -129,7 +132,7 @@ struct Adder {
     for (const cJSON *node : array_of(doc, "nodes")) {
       if (index_of(node, "mesh") != NONE && meshes.count(static_cast<size_t>(index_of(node, "mesh")))) {
         if (index_of(node, "skin") != NONE) {
-          refuse_skin();
+          refuse_skin(static_cast<size_t>(index_of(node, "mesh")));
         }
         set(editable(node), "skin", static_cast<double>(skin));
       }
@@ -314,5 +317,16 @@ extern "C" orb_status orb_gltf_add(orb_context *ctx, const unsigned char *bytes,
     buffers.load(document.root(), document.chunk(), size);
     gltf::Adder adder(ctx, document, buffers.buffer(0), *additions);
     adder.add(out);
+  });
+}
+
+extern "C" orb_status orb_gltf_try_skin(orb_context *ctx, const orb_added_skin *skin) {
+  struct Owner {
+    cJSON *doc = cJSON_CreateObject();
+    ~Owner() { cJSON_Delete(doc); }
+  } owner;
+  return gltf::guarded(ctx, skin->size, [&] {
+    gltf::Editor editor(ctx, gltf::made(owner.doc), gltf::Bytes{});
+    (void)gltf::copy_skin(ctx, owner.doc, &editor, *skin, gltf::Matrix());
   });
 }

@@ -117,17 +117,25 @@ Editor::Editor(orb_context *ctx, cJSON *doc, Bytes first)
       view_count_(cJSON_GetArraySize(views_)),
       first_(first) {}
 
-int64_t Editor::add_view(const void *bytes, size_t size, int target) {
+size_t Editor::add_bytes(const void *bytes, size_t size) {
   static const unsigned char zeros[4] = {0, 0, 0, 0};
   must(orb_context_check(ctx_));
   must(orb_buffer_append(ctx_, &added_, zeros, padding(added_.size)));
   size_t start = first_.size + padding(first_.size) + added_.size;
   must(orb_buffer_append(ctx_, &added_, bytes, size));
+  return start;
+}
+
+int64_t Editor::add_view(const void *bytes, size_t size, int target, size_t stride) {
+  size_t start = add_bytes(bytes, size);
   cJSON *view = made(cJSON_CreateObject());
   push(views_, view);
   set(view, "buffer", 0.0);
   set(view, "byteOffset", static_cast<double>(start));
   set(view, "byteLength", static_cast<double>(size));
+  if (stride) {
+    set(view, "byteStride", static_cast<double>(stride));
+  }
   if (target) {
     set(view, "target", static_cast<double>(target));
   }

@@ -50,8 +50,11 @@ class Editor {
   /* Adds an accessor of a glTF type such as "MAT4" over any bytes; returns its number. */
   int64_t add_list(const void *bytes, size_t size, int component_type, size_t count, const char *type, bool attribute);
 
-  /* Adds a view; returns its number. target 0: none. */
-  int64_t add_view(const void *bytes, size_t size, int target);
+  /* Adds a view; returns its number. target, stride 0: none. */
+  int64_t add_view(const void *bytes, size_t size, int target, size_t stride = 0);
+
+  /* Appends to the first buffer; returns where, a multiple of 4. */
+  size_t add_bytes(const void *bytes, size_t size);
 
   /* Appends the GLB. */
   void write(orb_buffer *out);

@@ -98,15 +98,18 @@ std::map<size_t, int64_t> skins_of(const Given &given, const std::vector<const B
   for (const Block *block : used) {
     out[block->mesh] = NONE;
   }
-  for (const cJSON *node : array_of(given.document.root(), "nodes")) {
-    int64_t mesh = index_of(node, "mesh"), skin = index_of(node, "skin");
+  const List nodes = array_of(given.document.root(), "nodes");
+  for (size_t n = 0; n < nodes.size(); n++) {
+    int64_t mesh = index_of(nodes[n], "mesh"), skin = index_of(nodes[n], "skin");
     auto found = mesh == NONE || skin == NONE ? out.end() : out.find(static_cast<size_t>(mesh));
     if (found == out.end()) {
       continue;
     }
     if (found->second != NONE && found->second != skin) {
-      throw Fault{ORB_E_BAD_OPTION, "The nodes of " + title_of(given, found->first) +
-                                        " have several skins, and an asset can have one. Leave \"skin\" out."};
+      throw Fault{ORB_E_BAD_OPTION,
+                  "The nodes of " + title_of(given, found->first) +
+                      " have several skins, and an asset can have one. Leave \"skin\" out.",
+                  {culprit("meshes", given.meshes, found->first), culprit("nodes", nodes, n)}};
     }
     found->second = skin;
   }
@@ -122,6 +125,10 @@ bool same_matrix(const Matrix &a, const Matrix &b) {
   return true;
 }
 
+Culprits both(const Given &given, const Block &a, const Block &b) {
+  return {culprit("meshes", given.meshes, a.mesh), culprit("meshes", given.meshes, b.mesh)};
+}
+
 /* The blocks that are skinned; fills skin and place. */
 std::vector<const Block *> skinned_blocks(const Given &given, const orb_given_file &file, orb_given_skin *out) {
   std::vector<const Block *> blocks;
@@ -135,12 +142,14 @@ std::vector<const Block *> skinned_blocks(const Given &given, const orb_given_fi
     if (!blocks.empty() && skin != out->skin) {
       throw Fault{ORB_E_BAD_OPTION,
                   "The meshes of its closed surface have several skins, and an asset can have one. Leave \"skin\" "
-                  "out, or upload the file with part=NAME."};
+                  "out, or upload the file with part=NAME.",
+                  both(given, *blocks[0], *block)};
     }
     if (!blocks.empty() && !same_matrix(blocks[0]->matrix, block->matrix)) {
       throw Fault{ORB_E_BAD_OPTION,
                   "The meshes of its closed surface stand under nodes with different transforms, which one skeleton "
-                  "does not fit. Apply the transforms in the program that made the file."};
+                  "does not fit. Apply the transforms in the program that made the file.",
+                  both(given, *blocks[0], *block)};
     }
     out->skin = static_cast<int32_t>(skin);
     blocks.push_back(block);
@@ -167,7 +176,8 @@ void read_weights(const Given &given, const Block &block, int32_t set, orb_given
   Numbers weights = given.buffers.attribute(block.primitive, ("WEIGHTS_" + number).c_str(), block.count, 4, 4, &width);
   for (size_t i = 0; !joints.empty() && !weights.empty() && i < 4 * block.count; i++) {
     if (!(joints[i] >= 0 && joints[i] < out->joint_count)) {
-      malformed("A vertex of " + title_of(given, block.mesh) + " names a joint that its skin does not have.");
+      malformed("A vertex of " + title_of(given, block.mesh) + " names a joint that its skin does not have.",
+                {culprit("meshes", given.meshes, block.mesh)});
     }
     size_t vertex = static_cast<size_t>(block.first) + i / 4;
     size_t at = vertex * static_cast<size_t>(out->influences) + 4 * static_cast<size_t>(set) + i % 4;
@@ -225,7 +235,8 @@ void read_moves(const Given &given, const Block &block, const cJSON *target, flo
   size_t width = 0;
   Numbers move = given.buffers.accessor(index, &width);
   if (width != 3 || move.size() != 3 * block.count) {
-    malformed("A morph target of " + title_of(given, block.mesh) + " does not fit its POSITION.");
+    malformed("A morph target of " + title_of(given, block.mesh) + " does not fit its POSITION.",
+              {culprit("meshes", given.meshes, block.mesh)});
   }
   for (size_t i = 0; i < block.count; i++) {
     for (int r = 0; r < 3; r++) {

@@ -7,6 +7,7 @@
 #include "format/gltf_named.hh"
 #include "format/gltf_parse.hh"
 #include "format/gltf_scene.hh"
+#include "format/gltf_unpack.hh"
 #include "format/gltf_weights.hh"
 
 extern "C" {
@@ -18,15 +19,15 @@ namespace gltf {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string &detail) {
-  throw Fault{ORB_E_BAD_OPTION, detail + " Or use another method than 'template'."};
+[[noreturn]] void refuse(const std::string &detail, Culprits culprits) {
+  throw Fault{ORB_E_BAD_OPTION, detail + " Or use another method than 'template'.", std::move(culprits)};
 }
 
 /* The linear part of a matrix and its inverse, which take vectors to the scene and back. */
 struct Frame {
   double to[9], back[9]; /* row-major */
 
-  explicit Frame(const Matrix &matrix, size_t mesh) {
+  Frame(const Matrix &matrix, size_t mesh, const Culprits &culprits) {
     double determinant = matrix.determinant();
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
@@ -38,7 +39,8 @@ struct Frame {
     for (double value : back) {
       if (!std::isfinite(value)) {
         refuse("The node of mesh " + std::to_string(mesh) +
-               " flattens it, so no target of the mesh gives a shape; give the node another scale.");
+                   " flattens it, so no target of the mesh gives a shape; give the node another scale.",
+               culprits);
       }
     }
   }
@@ -139,10 +141,22 @@ struct Keeper {
     }
   }
 
+  /* A mesh and the nodes that have it. */
+  Culprits mesh_and_nodes(size_t mesh) const {
+    Culprits out{culprit("meshes", meshes, mesh)};
+    const List nodes = array_of(doc, "nodes");
+    for (size_t n = 0; n < nodes.size(); n++) {
+      if (index_of(nodes[n], "mesh") == static_cast<int64_t>(mesh)) {
+        out.push_back(culprit("nodes", nodes, n));
+      }
+    }
+    return out;
+  }
+
   [[noreturn]] void refuse_copies(size_t mesh) const {
-    refuse("The scene shows mesh " + std::to_string(mesh) + " (\"" + text_of(meshes[mesh], "name").substr(0, 60) +
-           "\") " + std::to_string(showed[mesh]) +
-           " times, and targets of a mesh move all its copies alike. Give each node a mesh of its own.");
+    refuse("The scene shows " + title(mesh) + " " + std::to_string(showed[mesh]) +
+               " times, and targets of a mesh move all its copies alike. Give each node a mesh of its own.",
+           mesh_and_nodes(mesh));
   }
 
   std::string title(size_t mesh) const {
@@ -156,16 +170,22 @@ struct Keeper {
       return;
     }
     const std::vector<bool> named = named_meshes(doc, meshes.size(), shapes.parts);
+    Culprits wrong;
     for (size_t m = 0; m < meshes.size(); m++) {
-      bool is_part = is_on(first[m], size_of(m));
-      if (is_part != named[m]) {
-        throw Fault{ORB_E_BAD_OPTION,
-                    is_part ? "The closed surface has vertices of " + title(m) +
-                                  ", which \"template\" does not name. Name it, or upload the file with part=NAME."
-                            : "\"template\" names " + title(m) +
-                                  ", but the closed surface has no vertex of it. Leave it out, or upload the file with "
-                                  "part=NAME so that it is the surface."};
+      if (is_on(first[m], size_of(m)) != named[m]) {
+        wrong.push_back(culprit("meshes", meshes, m));
       }
+    }
+    if (!wrong.empty()) {
+      const std::string mesh = title(wrong[0].index);
+      throw Fault{ORB_E_BAD_OPTION,
+                  named[wrong[0].index]
+                      ? "\"template\" names " + mesh +
+                            ", but the closed surface has no vertex of it. Leave it out, or upload the file with "
+                            "part=NAME so that it is the surface."
+                      : "The closed surface has vertices of " + mesh +
+                            ", which \"template\" does not name. Name it, or upload the file with part=NAME.",
+                  wrong};
     }
   }
 
@@ -184,16 +204,18 @@ struct Keeper {
     return out;
   }
 
-  static void put(const double v[3], float *out) {
+  void put(const double v[3], size_t mesh, float *out) const {
     for (int k = 0; k < 3; k++) {
       out[k] = static_cast<float>(v[k]);
       if (!std::isfinite(out[k])) {
-        refuse("A target is too large for float32 in the coordinates of its mesh; give its node another scale.");
+        refuse(
+            "A target is too large for float32 in the coordinates of " + title(mesh) + "; give its node another scale.",
+            mesh_and_nodes(mesh));
       }
     }
   }
 
-  Floats moves(int64_t from, size_t count, const Frame &frame, int32_t target) const {
+  Floats moves(size_t mesh, int64_t from, size_t count, const Frame &frame, int32_t target) const {
     Floats out = room(count);
     for (size_t i = 0; i < count; i++) {
       int64_t at = 3 * static_cast<int64_t>(shapes.on_surface[from + static_cast<int64_t>(i)]);
@@ -201,15 +223,15 @@ struct Keeper {
         double way[3], local[3];
         orb_sub(shapes.positions[target + 1] + at, shapes.positions[0] + at, way);
         multiply(frame.back, way, local);
-        put(local, &out[3 * i]);
+        put(local, mesh, &out[3 * i]);
       }
     }
     return out;
   }
 
   /* How normals (width 3) or tangents (4) turn with the surface: by the shortest rotation of its smooth normal. */
-  Floats turns(int64_t from, size_t count, const Frame &frame, const Matrix &place, int32_t target,
-               const Numbers &values, size_t width) const {
+  Floats turns(size_t mesh, int64_t from, size_t count, const Frame &frame, int32_t target, const Numbers &values,
+               size_t width) const {
     Floats out = room(count);
     for (size_t i = 0; i < count; i++) {
       int64_t at = 3 * static_cast<int64_t>(shapes.on_surface[from + static_cast<int64_t>(i)]);
@@ -223,7 +245,7 @@ struct Keeper {
         continue;
       }
       if (width == 3) {
-        place.normal(value, seen);
+        matrix[mesh].normal(value, seen);
       } else {
         multiply(frame.to, value, seen);
       }
@@ -237,7 +259,7 @@ struct Keeper {
       for (int k = 0; k < 3; k++) {
         local[k] = length * local[k] - value[k];
       }
-      put(local, &out[3 * i]);
+      put(local, mesh, &out[3 * i]);
     }
     return out;
   }
@@ -258,14 +280,14 @@ struct Keeper {
       cJSON *target = made(cJSON_CreateObject());
       push(targets, target);
       int64_t position =
-          moves_it ? editor->add(moves(from, count, frame, k), 3, true, true) : zero_target(editor, count);
+          moves_it ? editor->add(moves(mesh, from, count, frame, k), 3, true, true) : zero_target(editor, count);
       set(target, "POSITION", static_cast<double>(position));
       if (!normal.empty()) {
-        Floats turned = turns(from, count, frame, matrix[mesh], k, normal, 3);
+        Floats turned = turns(mesh, from, count, frame, k, normal, 3);
         set(target, "NORMAL", static_cast<double>(editor->add(turned, 3, true, false)));
       }
       if (!tangent.empty()) {
-        Floats turned = turns(from, count, frame, matrix[mesh], k, tangent, 4);
+        Floats turned = turns(mesh, from, count, frame, k, tangent, 4);
         set(target, "TANGENT", static_cast<double>(editor->add(turned, 3, true, false)));
       }
     }
@@ -309,20 +331,32 @@ struct Keeper {
 
   void widen_mesh(size_t m, Editor *editor) {
     const List primitives = array_of(meshes[m], "primitives");
-    const Frame frame(matrix[m], m);
+    const Frame frame(matrix[m], m, mesh_and_nodes(m));
     size_t had = 0;
     int64_t from = first[m];
     for (size_t p = 0; p < primitives.size(); p++) {
       size_t targets = array_of(primitives[p], "targets").size();
       had = p == 0 ? targets : had;
       if (targets != had) {
-        malformed("The primitives of mesh " + std::to_string(m) + " have different numbers of morph targets.");
+        malformed("The primitives of " + title(m) + " have different numbers of morph targets.", mesh_and_nodes(m));
       }
       add_targets(primitives[p], m, from, frame, editor);
       from += is_surface(primitives[p]) ? static_cast<int64_t>(count_of(primitives[p])) : 0;
     }
     widened[static_cast<int64_t>(m)] = had;
     name_targets(editable(meshes[m]), m, had);
+  }
+
+  /* What reads a compressed mesh with targets is rare; the studio and the page's player do not. */
+  void unpack_if_needed(Editor *editor) {
+    bool is_needed = false;
+    for (size_t m = 0; m < meshes.size(); m++) {
+      is_needed = is_needed || (is_on(first[m], size_of(m)) && is_compressed(doc, meshes[m]));
+    }
+    if (is_needed) {
+      unpack(ctx, doc, buffers, editor);
+      drop("compression", "", "Targets belong to plain vertices; the values are those of the file.");
+    }
   }
 
   void note_images() const {
@@ -343,11 +377,13 @@ struct Keeper {
     if (bytes.size == 0) {
       refuse(
           "The first buffer of the glTF file has no bytes, so nothing can be added to it; send a file without a "
-          "fallback for compressed data, or with that buffer last.");
+          "fallback for compressed data, or with that buffer last.",
+          {culprit("buffers", array_of(doc, "buffers"), 0)});
     }
     number();
     check_parts();
     Editor editor(ctx, doc, bytes);
+    unpack_if_needed(&editor);
     for (size_t m = 0; m < meshes.size(); m++) {
       for (const cJSON *primitive : array_of(meshes[m], "primitives")) {
         kept->primitive_count += is_surface(primitive);

@@ -7,19 +7,22 @@ namespace gltf {
 
 namespace {
 
-[[noreturn]] void misfit() {
-  malformed("An animation of the skeleton of the glTF file does not fit its times.");
-}
-
 struct Motion {
   const Skeleton &from;
   const Buffers &buffers;
   const Indices &number;
   const Numbers &shift;
   Editor *editor;
+  Culprit animation;                                   /* that is copied */
   std::map<int64_t, std::pair<int64_t, size_t>> times; /* of an accessor: its copy, and how many keys it has */
   /* Of an accessor, by what it is read as: spline, keys, width, and node if it is shifted. */
   std::map<std::tuple<int64_t, bool, size_t, size_t, int64_t>, int64_t> keys;
+
+  [[noreturn]] void misfit() const {
+    malformed("Animation " + std::to_string(animation.index) +
+                  " of the glTF file moves its skeleton, and its values do not fit its times.",
+              {animation});
+  }
 
   Floats floats_of(const Numbers &values) const {
     Floats out{Charged<float>(from.ctx)};
@@ -132,11 +135,13 @@ void put_first(std::vector<Owned> *copies, cJSON *doc) {
 
 void copy_animations(const Skeleton &from, const cJSON *source, const Buffers &buffers, const Indices &number,
                      const Numbers &shift, cJSON *doc, Editor *editor) {
-  Motion motion{from, buffers, number, shift, editor, {}, {}};
+  const List animations = array_of(source, "animations");
+  Motion motion{from, buffers, number, shift, editor, {}, {}, {}};
   std::vector<Owned> copies;
-  for (const cJSON *animation : array_of(source, "animations")) {
+  for (size_t i = 0; i < animations.size(); i++) {
     must(orb_context_check(from.ctx));
-    Owned copy = copy_animation(&motion, animation);
+    motion.animation = culprit("animations", animations, i);
+    Owned copy = copy_animation(&motion, animations[i]);
     if (copy) {
       copies.push_back(std::move(copy));
     }

@@ -33,9 +33,11 @@ std::vector<bool> named_meshes(const cJSON *doc, size_t mesh_count, const orb_do
   std::vector<bool> named(mesh_count, false);
   for (int32_t i = 0; i < parts.mesh_count; i++) {
     if (parts.meshes[i] < 0 || static_cast<size_t>(parts.meshes[i]) >= mesh_count) {
-      throw Fault{ORB_E_BAD_OPTION, "\"template\" names mesh " + std::to_string(parts.meshes[i]) +
-                                        ", but the document of the first shape has " + std::to_string(mesh_count) +
-                                        (mesh_count == 1 ? " mesh." : " meshes.")};
+      throw Fault{ORB_E_BAD_OPTION,
+                  "\"template\" names mesh " + std::to_string(parts.meshes[i]) +
+                      ", but the document of the first shape has " + std::to_string(mesh_count) +
+                      (mesh_count == 1 ? " mesh." : " meshes."),
+                  {{"meshes", static_cast<size_t>(std::max(parts.meshes[i], 0)), ""}}};
     }
     named[static_cast<size_t>(parts.meshes[i])] = true;
   }

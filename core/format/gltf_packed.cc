@@ -24,6 +24,23 @@ Bytes part_of(const Bytes &bytes, size_t offset, size_t length) {
 
 }  // namespace
 
+double component_most(int64_t type) {
+  switch (type) {
+    case 5120:
+      return 127;
+    case 5121:
+      return 255;
+    case 5122:
+      return 32767;
+    case 5123:
+      return 65535;
+    case 5125:
+      return 4294967295.0;
+    default:
+      return 1;
+  }
+}
+
 bool is_fallback(const cJSON *buffer) {
   return cJSON_IsTrue(member(extension_of(buffer, MESHOPT), "fallback"));
 }
@@ -107,13 +124,19 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
     }
     charge(points * width * sizeof(double));
     Values values{Numbers(points * width, 0, Charged<double>(ctx_)), width};
+    /* Draco turns what it knows as shares of a whole into fractions by itself. */
+    const int64_t type = whole(accessor, "componentType", 0);
+    const bool is_raw = cJSON_IsTrue(member(accessor, "normalized")) && !attribute->normalized();
+    const double unit = is_raw ? component_most(type) : 1;
     for (size_t i = 0; i < points; i++) {
       float value[4] = {0, 0, 0, 0};
       auto at = attribute->mapped_index(draco::PointIndex(static_cast<uint32_t>(i)));
       if (!attribute->ConvertValue<float>(at, static_cast<int8_t>(width), value)) {
         malformed("A compressed glTF primitive has an attribute that is not numbers.");
       }
-      std::copy(value, value + width, values.list.begin() + static_cast<std::ptrdiff_t>(i * width));
+      for (size_t k = 0; k < width; k++) {
+        values.list[i * width + k] = static_cast<double>(value[k]) / unit;
+      }
     }
     accessors_.insert_or_assign(index, std::move(values));
   }

@@ -10,11 +10,14 @@
 
 namespace gltf {
 
+/* The largest value of a component, which a normalized one calls 1; 1 for floats. */
+double component_most(int64_t type);
+
 class Packed {
  public:
   using Octets = std::vector<unsigned char, Charged<unsigned char>>;
 
-  /* What an accessor of a compressed primitive holds. */
+  /* What an accessor of a compressed primitive holds; normalized components as fractions. */
   struct Values {
     Numbers list;
     size_t width;

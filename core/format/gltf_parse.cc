@@ -1,11 +1,14 @@
 #include "format/gltf_parse.hh"
 
+#include <cstdio>
+
 extern "C" {
 #include "base/error.h"
 #include "format/build.h"
 #include "format/bytes.h"
 #include "format/json_check.h"
 }
+#include "orbmorph/utf8.h"
 
 namespace gltf {
 
@@ -79,6 +82,20 @@ Bytes split_glb(const unsigned char *bytes, size_t size, Bytes *chunk, size_t *r
   return Bytes{bytes + 20, text};
 }
 
+/* Names the parts of the document in the error record. */
+void note(orb_context *ctx, const Culprits &culprits) {
+  orb_error *error = orb_context_error_edit(ctx);
+  error->element_total = static_cast<int64_t>(culprits.size());
+  for (const Culprit &part : culprits) {
+    if (error->element_count == ORB_ERROR_ITEMS) {
+      break;
+    }
+    orb_error_element *out = &error->elements[error->element_count++];
+    std::snprintf(out->where, sizeof out->where, "%s[%zu]", part.list.c_str(), part.index);
+    orb_utf8_copy(out->name, sizeof out->name, part.name.c_str());
+  }
+}
+
 }  // namespace
 
 Document::Document(orb_context *ctx, const unsigned char *bytes, size_t size, bool binary)
@@ -117,6 +134,7 @@ orb_status status_of_exception(orb_context *ctx, size_t size) {
     status = fault.status == ORB_E_MALFORMED_MESH
                  ? orb_build_malformed(ctx, 0, static_cast<int64_t>(size), "%s", fault.detail.c_str())
                  : orb_fail(ctx, fault.status, "%s", fault.detail.c_str());
+    note(ctx, fault.culprits);
   } catch (const std::bad_alloc &) {
     status = orb_fail(ctx, ORB_E_NO_MEMORY, "The machine is out of memory for the glTF file.");
   } catch (const std::exception &error) {

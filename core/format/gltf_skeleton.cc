@@ -4,8 +4,9 @@ namespace gltf {
 
 namespace {
 
-[[noreturn]] void refuse_loop(int64_t node) {
-  malformed("Node " + std::to_string(node) + " of the glTF file is a child of two nodes, or of itself.");
+[[noreturn]] void refuse_loop(const List &nodes, int64_t node) {
+  malformed("Node " + std::to_string(node) + " of the glTF file is a child of two nodes, or of itself.",
+            {culprit("nodes", nodes, static_cast<size_t>(node))});
 }
 
 }  // namespace
@@ -34,7 +35,7 @@ void Skeleton::link_nodes() {
       int64_t index = number_of(child);
       (void)element(nodes, index, "node");
       if (above[static_cast<size_t>(index)] != NONE) {
-        refuse_loop(index);
+        refuse_loop(nodes, index);
       }
       above[static_cast<size_t>(index)] = static_cast<int64_t>(i);
     }
@@ -52,7 +53,7 @@ void Skeleton::place_nodes() {
     for (; n != NONE && state[static_cast<size_t>(n)] != DONE; n = above[static_cast<size_t>(n)]) {
       check_sometimes(ctx, steps++);
       if (state[static_cast<size_t>(n)] == OPEN) {
-        refuse_loop(n);
+        refuse_loop(nodes, n);
       }
       state[static_cast<size_t>(n)] = OPEN;
       path.push_back(n);

@@ -20,14 +20,26 @@ namespace gltf {
 
 using List = std::vector<const cJSON *>;
 
+/* Parts of a document, such as {"meshes", 0, name}, that a refusal is about. */
+struct Culprit {
+  std::string list;
+  size_t index;
+  std::string name;
+};
+using Culprits = std::vector<Culprit>;
+
 /* A document that is refused. */
 struct Fault {
   orb_status status;
   std::string detail;
+  Culprits culprits;
+
+  Fault(orb_status why, std::string text, Culprits parts = {})
+      : status(why), detail(std::move(text)), culprits(std::move(parts)) {}
 };
 
-[[noreturn]] inline void malformed(const std::string &detail) {
-  throw Fault{ORB_E_MALFORMED_MESH, detail};
+[[noreturn]] inline void malformed(const std::string &detail, Culprits culprits = {}) {
+  throw Fault{ORB_E_MALFORMED_MESH, detail, std::move(culprits)};
 }
 
 /* A failed call of the C side: its status becomes an exception, its error record stays. */
@@ -120,6 +132,11 @@ inline const cJSON *element(const List &list, int64_t index, const char *what) {
 inline std::string text_of(const cJSON *object, const char *key) {
   const cJSON *item = member(object, key);
   return cJSON_IsString(item) ? std::string(item->valuestring) : std::string();
+}
+
+/* A part of the document in a list of it. */
+inline Culprit culprit(const char *list, const List &items, size_t index) {
+  return {list, index, index < items.size() ? text_of(items[index], "name") : std::string()};
 }
 
 /* Reads an array member of exactly `count` numbers; false where it is absent. */

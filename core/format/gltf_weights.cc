@@ -21,6 +21,9 @@ struct Weights {
   /* Appends zeros to the default weights of a mesh or node, of which it has `had` or none. */
   void widen_defaults(cJSON *object, size_t had, bool always) const {
     std::vector<double> weights(had, 0);
+    if (had + more() == 0) {
+      return;
+    }
     if (numbers(object, "weights", weights.data(), had) || always) {
       weights.resize(had + more(), 0);
       set(object, "weights", cJSON_CreateDoubleArray(weights.data(), static_cast<int>(weights.size())));
@@ -52,11 +55,11 @@ struct Weights {
   }
 
   /* The keyframes of a sampler with zeros for the new targets. */
-  int64_t widen_keys(const cJSON *sampler, size_t had) const {
+  int64_t widen_keys(const cJSON *sampler, size_t had, const Culprit &animation) const {
     size_t width = 0;
     Numbers old = buffers.accessor(whole(sampler, "output", NONE), &width);
     if (had == 0 || width != 1 || old.size() % had != 0 || old.empty()) {
-      malformed("An animation of weights does not fit the morph targets of its mesh.");
+      malformed("An animation of weights does not fit the morph targets of its mesh.", {animation});
     }
     size_t keys = old.size() / had, wide = had + more();
     Floats fresh{Charged<float>(ctx)};
@@ -69,7 +72,7 @@ struct Weights {
     return editor->add(fresh, 1, false, false);
   }
 
-  void widen_animation(cJSON *animation) const {
+  void widen_animation(cJSON *animation, const Culprit &self) const {
     const List channels = array_of(animation, "channels"), samplers = array_of(animation, "samplers");
     std::map<std::pair<int64_t, int64_t>, int64_t> fresh; /* sampler and targets before: the sampler in its place */
     std::map<int64_t, std::set<int64_t>> users;           /* of a sampler: targets before, NONE: not of ours */
@@ -88,7 +91,7 @@ struct Weights {
       auto key = std::make_pair(sampler, before);
       if (!fresh.count(key)) {
         const cJSON *old = element(samplers, sampler, "sampler");
-        double output = static_cast<double>(widen_keys(old, static_cast<size_t>(before)));
+        double output = static_cast<double>(widen_keys(old, static_cast<size_t>(before), self));
         if (users[sampler].size() == 1) {
           set(editable(old), "output", output);
           fresh[key] = sampler;
@@ -168,8 +171,9 @@ struct Weights {
         widen_defaults(editable(node), mesh->second, false);
       }
     }
-    for (const cJSON *animation : array_of(doc, "animations")) {
-      widen_animation(editable(animation));
+    const List animations = array_of(doc, "animations");
+    for (size_t i = 0; i < animations.size(); i++) {
+      widen_animation(editable(animations[i]), culprit("animations", animations, i));
     }
     return shapes.key_count == 0 || add_animation();
   }

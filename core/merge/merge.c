@@ -8,10 +8,12 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "carry/carry.h"
+#include "carry/check.h"
 #include "merge/coarse.h"
 #include "merge/report.h"
 #include "mesh/refuse.h"
 #include "transfer/holes.h"
+#include "transfer/keep.h"
 
 void orb_merge_defaults(orb_merge_options *options) {
   memset(options, 0, sizeof *options);
@@ -77,12 +79,42 @@ static orb_status check_shapes(orb_context *ctx, const orb_align_shape *shapes, 
   return ORB_OK;
 }
 
+static int keeps_document(const orb_merge_options *options) {
+  return options->remesh.method == ORB_REMESH_TEMPLATE && options->file && options->file_bytes;
+}
+
+static orb_document document_of(const orb_merge_options *options) {
+  return (orb_document){options->file, options->file_bytes, options->file_size, options->file_parts};
+}
+
+orb_status orb_merge_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                           const orb_merge_options *options) {
+  const int is_document = keeps_document(options);
+  ORB_TRY(check_shapes(ctx, shapes, shape_count));
+  if (!is_document && options->remesh.method == ORB_REMESH_TEMPLATE &&
+      options->file_parts.mesh_count + options->file_parts.node_count > 0) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "\"template\" names meshes or nodes, but the first shape is not glTF; leave that member out.");
+  }
+  if (is_document) {
+    orb_document document = document_of(options);
+    ORB_TRY(orb_document_try(ctx, shapes[0].mesh, &document));
+  }
+  orb_carry_wish wish = {.given = shapes,
+                         .files = options->files,
+                         .shape_count = shape_count,
+                         .carries = options->carries,
+                         .carry_count = options->carry_count,
+                         .is_document = is_document};
+  return orb_carry_check(ctx, &wish);
+}
+
 /* Writes the GLB by the method's own way. */
 static orb_status write_glb(orb_context *ctx, const orb_align_shape *given, const char *const *names,
                             const orb_merge_options *options, const orb_asset_options *asset, orb_merge_result *out) {
   const orb_aligned_shape *shapes = out->alignment.shapes;
   if (out->is_document) {
-    orb_document document = {options->file, options->file_bytes, options->file_size, options->file_parts};
+    orb_document document = document_of(options);
     return orb_asset_write_document(ctx, &out->supermesh, shapes, &document, names, asset, &out->asset_facts,
                                     &out->asset, &out->asset_vertices, &out->dropped, &out->dropped_count);
   }
@@ -128,12 +160,7 @@ done:
 static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, int32_t shape_count,
                               const char *const *names, const orb_merge_options *options, orb_merge_result *out) {
   const orb_aligned_shape *shapes = out->alignment.shapes;
-  out->is_document = options->remesh.method == ORB_REMESH_TEMPLATE && options->file && options->file_bytes;
-  if (!out->is_document && options->remesh.method == ORB_REMESH_TEMPLATE &&
-      options->file_parts.mesh_count + options->file_parts.node_count > 0) {
-    return orb_fail(ctx, ORB_E_BAD_OPTION,
-                    "\"template\" names meshes or nodes, but the first shape is not glTF; leave that member out.");
-  }
+  out->is_document = keeps_document(options);
   ORB_TRY(write_carried(ctx, given, names, options, out));
   if (!out->is_document) {
     ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
@@ -193,7 +220,7 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
   const double start = orb_clock();
   orb_alignment alignment;
   memset(out, 0, sizeof *out);
-  ORB_TRY(check_shapes(ctx, shapes, shape_count));
+  ORB_TRY(orb_merge_check(ctx, shapes, shape_count, options));
   orb_progress(ctx, "align", 0);
   ORB_TRY(orb_align(ctx, shapes, shape_count, landmarks, landmark_count, &options->align, &alignment));
   const double seconds = orb_clock() - start;

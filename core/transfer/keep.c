@@ -1,6 +1,7 @@
 #include "transfer/keep.h"
 
 #include "base/check.h"
+#include "base/error.h"
 #include "base/memory.h"
 #include "format/gltf_keep.h"
 #include "mesh/normals.h"
@@ -78,6 +79,34 @@ static orb_status describe(orb_context *ctx, const orb_draft *draft, const orb_d
   return ORB_OK;
 }
 
+/* The document is that of the first shape. */
+static orb_status blame_first(orb_context *ctx, orb_status status) {
+  if (status == ORB_E_BAD_OPTION || status == ORB_E_MALFORMED_MESH) {
+    orb_context_error_edit(ctx)->shape = 0;
+  }
+  return status;
+}
+
+orb_status orb_document_try(orb_context *ctx, const orb_mesh *repaired, const orb_document *document) {
+  const orb_mesh *file = document->mesh;
+  int32_t *on_surface = ORB_NEW(ctx, int32_t, file->file_vertex_count);
+  orb_gltf_shapes none = {
+      .file_vertex_count = file->file_vertex_count, .on_surface = on_surface, .parts = document->parts};
+  orb_gltf_kept kept = {0};
+  orb_buffer out = {0};
+  if (!on_surface) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < file->file_vertex_count; v++) {
+    on_surface[v] = orb_repaired_vertex(repaired, file, v);
+  }
+  orb_status status = blame_first(ctx, orb_gltf_keep(ctx, document->bytes, document->size, &none, &kept, &out));
+  orb_buffer_free(ctx, &out);
+  orb_free(ctx, kept.dropped);
+  orb_free(ctx, on_surface);
+  return status;
+}
+
 orb_status orb_draft_keep(orb_context *ctx, const orb_draft *draft, const orb_document *document,
                           const char *const *names, orb_asset_facts *facts, orb_buffer *out, int32_t **vertices,
                           orb_dropped **list, int32_t *count) {
@@ -86,7 +115,7 @@ orb_status orb_draft_keep(orb_context *ctx, const orb_draft *draft, const orb_do
   orb_gltf_kept kept = {0};
   orb_status status = describe(ctx, draft, document, names, &k, &shapes);
   if (status == ORB_OK) {
-    status = orb_gltf_keep(ctx, document->bytes, document->size, &shapes, &kept, out);
+    status = blame_first(ctx, orb_gltf_keep(ctx, document->bytes, document->size, &shapes, &kept, out));
     *list = kept.dropped;
     *count = kept.dropped_count;
   }

@@ -10,4 +10,8 @@ ORB_MUST_CHECK orb_status orb_draft_keep(orb_context *ctx, const orb_draft *draf
                                          const char *const *names, orb_asset_facts *facts, orb_buffer *out,
                                          int32_t **vertices, orb_dropped **list, int32_t *count);
 
+/* Whether a document can be kept: fails as orb_draft_keep() would, for all reasons that the document gives. repaired:
+ * the first shape before the alignment. */
+ORB_MUST_CHECK orb_status orb_document_try(orb_context *ctx, const orb_mesh *repaired, const orb_document *document);
+
 #endif

@@ -120,10 +120,13 @@ static orb_status make_vertices(maker *m, orb_template *made) {
 }
 
 /* The supermesh of the method has the vertices of the repaired mesh, in their order. */
-int32_t orb_template_vertex(const orb_draft *draft, const orb_mesh *file, int32_t v) {
-  const orb_mesh *repaired = &draft->shapes[0].mesh;
+int32_t orb_repaired_vertex(const orb_mesh *repaired, const orb_mesh *file, int32_t v) {
   int32_t number = file->source[v];
-  int32_t at = number >= 0 && number < repaired->file_vertex_count ? repaired->vertex_of_source[number] : -1;
+  return number >= 0 && number < repaired->file_vertex_count ? repaired->vertex_of_source[number] : -1;
+}
+
+int32_t orb_template_vertex(const orb_draft *draft, const orb_mesh *file, int32_t v) {
+  int32_t at = orb_repaired_vertex(&draft->shapes[0].mesh, file, v);
   return at < draft->supermesh->vertex_count ? at : -1;
 }
 

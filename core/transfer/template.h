@@ -17,6 +17,8 @@ typedef struct orb_template {
  * also after an error: `out` refers to `draft` and `made`. O(V·F). */
 ORB_MUST_CHECK orb_status orb_template_draft(orb_context *ctx, const orb_draft *draft, const orb_mesh *file,
                                              orb_template *made, orb_draft *out);
+/* The vertex of the repaired first shape that stands for vertex v of `file`; −1: none. */
+int32_t orb_repaired_vertex(const orb_mesh *repaired, const orb_mesh *file, int32_t v);
 /* The supermesh vertex of vertex v of `file`; −1: it is not on the closed surface. */
 int32_t orb_template_vertex(const orb_draft *draft, const orb_mesh *file, int32_t v);
 void orb_template_free(orb_context *ctx, orb_template *made);

@@ -299,7 +299,8 @@ static int align_shapes(const run_env *env, orb_context *ctx, const merge_input 
 static int merge(const run_env *env, orb_context *ctx, const merge_input *in, orb_merge_result *out) {
   orb_alignment alignment;
   double seconds;
-  if (!align_shapes(env, ctx, in, &alignment, &seconds) ||
+  if (orb_merge_check(ctx, in->shapes, in->request.shape_count, &in->request.merge) != ORB_OK ||
+      !align_shapes(env, ctx, in, &alignment, &seconds) ||
       orb_merge_aligned(ctx, in->shapes, in->names, in->request.shape_count, in->landmarks, &alignment,
                         &in->request.merge, out) != ORB_OK) {
     return 0;

@@ -43,7 +43,8 @@ function band(vertices, first, end) {
 }
 
 /** @returns {{bytes: Buffer, surface: {positions: number[][], triangles: number[][]}}} the GLB, and its closed surface */
-export function rigged() {
+/** edit: changes the document before it is written. */
+export function rigged({ edit = () => {} } = {}) {
   const parts = [];
   const gltf = {
     asset: { version: '2.0', generator: 'a modelling program', copyright: 'nobody' },
@@ -197,6 +198,7 @@ export function rigged() {
 
   const bin = Buffer.concat(parts);
   gltf.buffers = [{ byteLength: bin.length }];
+  edit(gltf);
   const text = Buffer.from(JSON.stringify(gltf));
   const json = Buffer.concat([text, Buffer.alloc((4 - (text.length % 4)) % 4, ' ')]);
   const head = Buffer.alloc(20);

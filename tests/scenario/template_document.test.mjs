@@ -158,15 +158,78 @@ for (const [kind, write] of [
 test('a mesh that the scene shows twice is refused', async (t) => {
   const d = await daemon(t);
   const twice = (gltf) => {
-    gltf.scenes[0].nodes = [0, 1];
-    gltf.nodes = [{ mesh: 0 }, { mesh: 0, translation: [5, 0, 0] }];
+    gltf.scenes[0].nodes = [2];
+    gltf.meshes[0].name = 'egg';
+    gltf.nodes = [{ name: 'one', mesh: 0 }, { mesh: 0, translation: [5, 0, 0] }, { children: [0, 1] }];
   };
   const file = writeGlb({ ...shapes.egg(2), edit: twice });
   const request = await merge(d, file, { name: 'eggs', repair: 'largest_component' }, [shapes.bean(2)]);
-  const job = await d.make('/v1/supermeshes', request);
-  const problem = JSON.stringify(job);
-  assert.match(problem, /shows mesh 0/);
-  assert.match(problem, /mesh of its own/);
+  const { problem } = await d.make('/v1/supermeshes', request);
+  assert.match(problem.detail, /shows mesh 0 \("egg"\) 2 times/);
+  assert.match(problem.detail, /mesh of its own/);
+  assert.equal(problem.shape, 0);
+  assert.equal(problem.element_count, 3);
+  assert.deepEqual(problem.elements, [
+    { where: 'meshes[0]', name: 'egg' },
+    { where: 'nodes[0]', name: 'one' },
+    { where: 'nodes[1]' },
+  ]);
+  const { timings_ms } = await d.made('/v1/supermeshes', { ...request, remesh: { method: 'adaptive' } });
+  assert.ok(timings_ms.align > 0, 'the refusal came before the alignment, which would be kept');
+});
+
+const grown = (by, { positions, ...rest }) => ({ ...rest, positions: positions.map((p) => p.map((x) => by * x)) });
+
+test('a document that cannot get targets is refused by the parts at fault', async (t) => {
+  const d = await daemon(t);
+  const refused = async (egg, edit, detail, elements, type = '/problems/bad-option') => {
+    const request = await merge(d, writeGlb({ ...egg, edit }), { name: 'egg' }, [grown(10, shapes.bean(2))]);
+    const { problem } = await d.make('/v1/supermeshes', request);
+    assert.equal(problem?.type, type);
+    assert.match(problem.detail, detail);
+    assert.deepEqual([problem.shape, problem.elements], [0, elements]);
+  };
+  const tiny = (gltf) => {
+    gltf.meshes[0].name = 'dust';
+    gltf.nodes = [{ name: 'shrink', mesh: 0, scale: [1e-38, 1e-38, 1e-38] }];
+  };
+  await refused(
+    grown(1e38, shapes.egg(2)),
+    tiny,
+    /A target is too large for float32 in the coordinates of mesh 0 \("dust"\); give its node another scale/,
+    [
+      { where: 'meshes[0]', name: 'dust' },
+      { where: 'nodes[0]', name: 'shrink' },
+    ],
+  );
+  const misfit = (gltf, push) => {
+    const numbers = (list) =>
+      gltf.accessors.push({
+        bufferView: push(Buffer.from(Float32Array.from(list).buffer)),
+        componentType: 5126,
+        count: list.length,
+        type: 'SCALAR',
+      }) - 1;
+    const moves = push(Buffer.alloc(12 * gltf.accessors[0].count));
+    const { count } = gltf.accessors[0];
+    const target = {
+      POSITION: gltf.accessors.push({ bufferView: moves, componentType: 5126, count, type: 'VEC3' }) - 1,
+    };
+    gltf.meshes[0].primitives[0].targets = [target, target];
+    const sampler = { input: numbers([0, 1]), output: numbers([0, 1, 0]) };
+    gltf.nodes = [{ mesh: 0 }];
+    gltf.animations = [
+      { name: 'idle', channels: [], samplers: [] },
+      { name: 'talk', channels: [{ sampler: 0, target: { node: 0, path: 'weights' } }], samplers: [sampler] },
+    ];
+  };
+  await refused(
+    shapes.egg(2),
+    misfit,
+    /animation of weights does not fit/,
+    [{ where: 'animations[1]', name: 'talk' }],
+    '/problems/malformed-mesh',
+  );
 });
 
 test('a request names the meshes or nodes that are the surface', async (t) => {
@@ -181,15 +244,17 @@ test('a request names the meshes or nodes that are the surface', async (t) => {
     assert.deepEqual(named.request.template, { meshes: [], nodes: [], ...template });
     assert.ok((await assetOf(named)).equals(await assetOf(plain)), JSON.stringify(template));
   }
-  for (const [template, why] of [
-    [{ meshes: [0, 1] }, /names mesh 0 \("eye"\), but the closed surface has no vertex of it/],
-    [{ nodes: ['left eye'] }, /names mesh 0 \("eye"\)/],
+  const eye = [{ where: 'meshes[0]', name: 'eye' }];
+  for (const [template, why, elements] of [
+    [{ meshes: [0, 1] }, /names mesh 0 \("eye"\), but the closed surface has no vertex of it/, eye],
+    [{ nodes: ['left eye'] }, /names mesh 0 \("eye"\)/, [...eye, { where: 'meshes[1]', name: 'Body' }]],
     [{ nodes: ['nobody'] }, /the node "nobody", which the document of the first shape does not have/],
-    [{ meshes: [2] }, /names mesh 2, but the document of the first shape has 2 meshes/],
+    [{ meshes: [2] }, /names mesh 2, but the document of the first shape has 2 meshes/, [{ where: 'meshes[2]' }]],
   ]) {
     const { problem } = await d.make('/v1/supermeshes', { ...request, template });
     assert.equal(problem?.type, '/problems/bad-option');
     assert.match(problem.detail, why);
+    assert.deepEqual(problem.elements, elements);
   }
   for (const template of ['body', { meshes: 1 }, { meshes: [-1] }, { meshes: [0.5] }, { nodes: [''] }])
     assertProblem(await d.post('/v1/supermeshes', { ...request, template }), 422, 'invalid-request');

@@ -268,20 +268,43 @@ test('a skin that cannot be taken is refused', async (t) => {
   const d = await daemon(t);
   const body = await uploaded(d, rigged().bytes, { name: 'body', repair: 'largest_component' });
   const egg = await uploaded(d, shapes.obj(shapes.egg(2)), { name: 'egg' });
-  const refused = async (request, why) => {
+  const refused = async (request, why, members) => {
     const { problem } = await d.make('/v1/supermeshes', { asset, ...request });
-    assert.equal(problem?.type, '/problems/bad-option');
+    const { type, shape, transfer, elements } = problem ?? {};
     assert.match(problem.detail, why);
+    assert.deepEqual(
+      { type, shape, transfer, elements },
+      { type: '/problems/bad-option', elements: undefined, ...members },
+    );
   };
   const skin = (from) => [{ from, what: 'skin' }];
-  await refused({ shapes: [body, egg], transfer: skin(1) }, /shape 1, which has no skin/);
-  await refused(
-    { shapes: [body, egg], transfer: [{ from: 1, what: 'targets' }] },
-    /shape 1, which has no morph targets/,
-  );
+  await refused({ shapes: [body, egg], transfer: skin(1) }, /shape 1, which has no skin/, { shape: 1, transfer: 0 });
+  const missing = ['skin', 'targets'].map((what, from) => ({ from, what }));
+  const none = { shape: 1, transfer: 1 };
+  await refused({ shapes: [body, egg], transfer: missing }, /shape 1, which has no morph targets/, none);
   const remesh = { method: 'template' };
-  await refused({ shapes: [body, body], remesh, transfer: skin(1) }, /has a skin already/);
+  const elements = [{ where: 'meshes[1]', name: 'Body' }];
+  const own0 = { shape: 0, transfer: 0, elements };
+  await refused({ shapes: [body, body], remesh, transfer: skin(1) }, /has a skin already/, own0);
   const own = await d.made('/v1/supermeshes', { shapes: [body, egg], remesh, transfer: skin(0), asset });
   assert.deepEqual(own.transferred, [], 'its document has it');
   assertProblem(await d.get(`${own.asset}?profile=meshopt`), 422, 'bad-option');
+});
+
+test('a skeleton that cannot be copied is refused before the work', async (t) => {
+  const d = await daemon(t);
+  const { bytes: wave } = rigged({
+    edit: (gltf) => {
+      const [{ samplers }] = gltf.animations;
+      gltf.accessors[samplers[0].input].count -= 1;
+    },
+  });
+  const egg = await uploaded(d, shapes.obj(shapes.egg(2)), { name: 'egg' });
+  const body = await uploaded(d, wave, { name: 'body', repair: 'largest_component' });
+  const request = { shapes: [egg, body], asset };
+  const { problem } = await d.make('/v1/supermeshes', { ...request, transfer: [{ from: 1, what: 'skin' }] });
+  assert.equal(problem?.type, '/problems/malformed-mesh');
+  assert.deepEqual([problem.shape, problem.transfer], [1, 0]);
+  assert.deepEqual(problem.elements, [{ where: 'animations[0]', name: 'wave' }]);
+  assert.ok((await d.made('/v1/supermeshes', request)).timings_ms.align > 0, 'the alignment was not computed for it');
 });

@@ -1,11 +1,15 @@
 // What the morph takes from a later shape besides its surface, and the looks of its materials.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { writePng } from '../scenario/support/png.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { addFiles, button, countPixels, defaultShown, json, openPage, settled, until } from './support.mjs';
+import { addFiles, button, countPixels, defaultShown, difference, json, openPage, settled, until } from './support.mjs';
 
 /** Texture coordinates by a projection; the picture has one colour, so front and back may share texels. */
 const charts = ({ positions }) => positions.map(([x, y]) => [0.5 + 0.2 * x, 0.5 + 0.2 * y]);
@@ -30,8 +34,25 @@ const skinned = (count) => (gltf, push) => {
   gltf.skins = [{ joints: [1] }];
 };
 
-const red = (page) => countPixels(page, '.pane-view', (r, g, b) => r > 90 && g < r / 2 && b < r / 2);
+const red = (page, view = '.pane-view') => countPixels(page, view, (r, g, b) => r > 90 && g < r / 2 && b < r / 2);
 const blue = (page) => countPixels(page, '.pane-view', (r, g, b) => b > 90 && r < b / 2 && g < b / 2);
+
+/** Downloads the page of the shown morph, and opens it. */
+async function assertPage(page, check) {
+  await button(page, 'Use it').click();
+  const waiting = page.waitForEvent('download');
+  await page.getByRole('region', { name: 'Take it away' }).getByRole('button', { name: 'Web page' }).click();
+  const file = await waiting;
+  const folder = mkdtempSync(join(tmpdir(), 'orbmorph-page-'));
+  await file.saveAs(join(folder, 'page.html'));
+  const other = await browser.newPage({ viewport: { width: 500, height: 400 } });
+  await other.goto(pathToFileURL(join(folder, 'page.html')).href);
+  await other.locator('body[data-ready]').waitFor();
+  await check(other);
+  await other.close();
+  rmSync(folder, { recursive: true });
+  await page.keyboard.press('Escape');
+}
 
 test('a skin, targets and a texture of the second shape are taken by a tick each, and looks are chosen', async () => {
   const { page, done } = await openPage(browser, daemon.url);
@@ -76,14 +97,27 @@ test('a skin, targets and a texture of the second shape are taken by a tick each
   await settled(page);
   assert.ok((await red(page)) > 1000 && (await blue(page)) === 0, 'the texture of the second shape');
 
+  const targets = page.getByRole('group', { name: 'Targets of the files' });
+  assert.deepEqual(await targets.locator('label').allInnerTexts(), ['target 0']);
+  const before = await page.locator('.pane-view').first().screenshot();
+  await targets.getByRole('slider').fill('1');
+  await settled(page);
+  const after = await page.locator('.pane-view').first().screenshot();
+  assert.ok((await difference(browser, before, after)) > 0.005, 'the target moves the shape where the morph stands');
+  await assertPage(page, (other) => until(async () => (await red(other, 'canvas')) > 1000, 'the page has the look'));
+
   await until(
-    () => /[#&]x=1:skin,1:targets,1:texture(&|$)/.test(page.url()) && /[#&]look=1(&|$)/.test(page.url()),
+    () =>
+      /[#&]e=1(&|$)/.test(page.url()) &&
+      /[#&]x=1:skin,1:targets,1:texture(&|$)/.test(page.url()) &&
+      /[#&]look=1(&|$)/.test(page.url()),
     'URL',
   );
   await page.reload();
   await looks.getByRole('button', { name: 'bean', pressed: true }).waitFor();
   await settled(page);
   assert.ok((await red(page)) > 1000, 'a link shows the same look');
+  assert.equal(await targets.getByRole('slider').inputValue(), '1', 'and the same target');
   await button(page, 'Shapes').click();
   const ticked = await offers.locator('label:has(input:checked)').allInnerTexts();
   assert.deepEqual(ticked, [

@@ -80,7 +80,7 @@ test('the default morph replaces the fast one and keeps time, camera and view', 
   await done();
 });
 
-test('the default job is sent when the fast one has ended, not to compute beside it', async () => {
+test('the default job is sent when the fast one has ended, not to compute beside it, also after a reload', async () => {
   const job = { id: '2'.repeat(32), url: `/v1/jobs/${'2'.repeat(32)}`, kind: 'supermesh', state: 'running' };
   Object.assign(job, { stage: 'align', progress: 0.4, result: null, problem: null, attempt: 1 });
   let ended = false;
@@ -99,9 +99,14 @@ test('the default job is sent when the fast one has ended, not to compute beside
   await polled();
   await polled();
   assert.deepEqual(posted, ['fast']);
+  await until(() => /[#&]go=1(&|$)/.test(page.url()), 'the address says that a morph is to come');
+  await page.reload();
+  await polled();
+  await polled();
+  assert.deepEqual(posted, ['fast', 'fast'], 'equal requests are one job');
   ended = true;
   await page.getByRole('alert').getByText('No default morph').waitFor();
-  assert.deepEqual(posted, ['fast', 'default']);
+  assert.deepEqual(posted, ['fast', 'fast', 'default']);
   await done();
 });
 

@@ -493,7 +493,7 @@ test('repairs add up; a piece replaces the largest, and a size another size', ()
   for (const [list, more, expected] of cases) assert.equal(mesh.withRepairs(list, more), expected);
 });
 
-test('a kept document: the new targets, in the scene, after those that it had', () => {
+test('a kept document: the new targets, in the scene, then those that it had, and the meshes that stay', () => {
   const ways = FACES.map((_, v) => [v, 0, 1]);
   const glb = writeGlb({
     positions: TETRAHEDRON,
@@ -506,33 +506,82 @@ test('a kept document: the new targets, in the scene, after those that it had', 
       primitive.targets.unshift({ POSITION: primitive.attributes.POSITION });
       body.extras = { targetNames: ['smile', 'other'], firstShape: 1 };
       gltf.meshes.unshift({ primitives: [{ attributes: primitive.attributes, indices: primitive.indices }] });
-      gltf.nodes = [{ mesh: 1, scale: [-2, 1, 1], translation: [0, 5, 0] }];
+      gltf.nodes = [
+        { mesh: 1, scale: [-2, 1, 1], translation: [0, 5, 0], weights: [0.25, 0] },
+        { mesh: 0, translation: [9, 0, 0] },
+        { mesh: 0, scale: [3, 3, 3] },
+      ];
+      gltf.scenes = [{ nodes: [0, 1, 2] }];
     },
   });
   const bytes = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.length);
-  const { names, targets, position, index, frame, normal } = mesh.decodeMorph(bytes, 2);
-  assert.deepEqual(names, ['other']);
-  assert.equal(targets.length, 1);
-  const close = (a, b) =>
+  const { names, targets, extras, moving, vertices, triangles, position, index, frame, normal } = mesh.decodeMorph(
+    bytes,
+    2,
+  );
+  assert.deepEqual([vertices, triangles], [4, 4]);
+  assert.deepEqual(names, ['other', 'smile']);
+  assert.equal(targets.length, 2);
+  assert.deepEqual(extras, [{ name: 'smile', at: 1, target: 0, weight: 0.25 }]);
+  const close = (a, b) => {
+    assert.equal(a.length, b.length);
     assert.ok(
-      [...a].every((x, i) => Math.abs(x - b[i]) < 1e-6),
+      [...a].every((x, i) => Math.abs(x - b[i]) < 1e-5),
       `${[...a]} ${b}`,
     );
+  };
+  assert.deepEqual(moving, { vertices: 4, corners: 12 });
   const scene = (values) => values.map((x, i) => x * frame.radius + frame.center[i % 3]);
   close(
     scene(position),
-    TETRAHEDRON.flatMap(([x, y, z]) => [-2 * x, y + 5, z]),
+    [
+      ...TETRAHEDRON.map(([x, y, z]) => [-2 * x, y + 5, z]),
+      ...TETRAHEDRON.map(([x, y, z]) => [x + 9, y, z]),
+      ...TETRAHEDRON.map((p) => p.map((x) => 3 * x)),
+    ].flat(),
   );
   close(
     targets[0].position.map((x) => x * frame.radius),
-    ways.flatMap(([x, y, z]) => [-2 * x, y, z]),
+    [...ways.map(([x, y, z]) => [-2 * x, y, z]), ...new Array(8).fill([0, 0, 0])].flat(),
   );
   assert.deepEqual(
     [...index],
-    FACES.flatMap(([a, b, c]) => [a, c, b]),
+    [
+      ...FACES.map(([a, b, c]) => [a, c, b]),
+      ...FACES.map((t) => t.map((v) => v + 4)),
+      ...FACES.map((t) => t.map((v) => v + 8)),
+    ].flat(),
     'a mirror turns the triangles',
   );
-  close(normal, [0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1]);
+  close(normal, new Array(12).fill([0, 0, 1]).flat());
+});
+
+test('looks: the variants of a document, and its own materials if no variant has them', () => {
+  const glb = (mappings) =>
+    writeGlb({
+      positions: TETRAHEDRON,
+      triangles: FACES,
+      moves: TETRAHEDRON,
+      edit: (gltf) => {
+        gltf.materials = ['blue', 'red'].map((name) => ({ name }));
+        gltf.extensions = { KHR_materials_variants: { variants: [{ name: 'day' }, { name: 'night' }] } };
+        Object.assign(gltf.meshes[0].primitives[0], {
+          material: 0,
+          extensions: { KHR_materials_variants: { mappings } },
+        });
+      },
+    });
+  const looks = (mappings) => {
+    const file = glb(mappings);
+    return mesh.decodeMorph(file.buffer.slice(file.byteOffset, file.byteOffset + file.length), 2).looks;
+  };
+  const variants = [
+    { name: 'day', variant: 0 },
+    { name: 'night', variant: 1 },
+  ];
+  assert.deepEqual(looks([{ material: 1, variants: [1] }]), variants, 'day has the own material');
+  assert.deepEqual(looks([{ material: 0, variants: [0] }]), variants);
+  assert.deepEqual(looks([{ material: 1, variants: [0, 1] }]), [{ name: 'As in the file', variant: -1 }, ...variants]);
 });
 
 test('another match: it flips if limbs change sides, and neither stay nor trade with head or tail', () => {

@@ -1,4 +1,4 @@
-/* Pictures: every kind of PNG by its definition, JPEGs of many scans, and cancellation. */
+/* Pictures: every kind of PNG by its definition, also without its end, JPEGs of many scans, and cancellation. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -144,20 +144,39 @@ static bytes write_png(const kind *k, int interlaced, int gamma) {
   return out;
 }
 
+static void assert_shows(orb_context *ctx, const kind *k, const unsigned char *data, size_t size) {
+  orb_pixels made;
+  assert_int_equal(orb_image_decode(ctx, data, size, &made), ORB_OK);
+  assert_true(made.width == WIDTH && made.height == HEIGHT);
+  for (int p = 0; p < WIDTH * HEIGHT; p++) {
+    unsigned char wanted[4];
+    pixel_of(k, p % WIDTH, p / WIDTH, wanted);
+    assert_memory_equal(made.rgba + (size_t)4 * (size_t)p, wanted, 4);
+  }
+  orb_free(ctx, made.rgba);
+}
+
 static void every_kind_of_png(void **state) {
-  orb_context *ctx = *state;
   for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
     for (int way = 0; way < 4; way++) {
       bytes file = write_png(&kinds[i], way & 1, way & 2);
+      assert_shows(*state, &kinds[i], file.data, file.size);
+      free(file.data);
+    }
+  }
+}
+
+/* Other programs show a PNG whose last chunk is missing; one whose pixels are missing has no picture. */
+static void png_without_its_end(void **state) {
+  enum { IEND = 12 }; /* bytes of the last chunk: length, name, checksum */
+  for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+    for (int interlaced = 0; interlaced < 2; interlaced++) {
+      bytes file = write_png(&kinds[i], interlaced, 0);
+      assert_memory_equal(file.data + file.size - IEND + 4, "IEND", 4);
+      assert_shows(*state, &kinds[i], file.data, file.size - IEND);
       orb_pixels made;
-      assert_int_equal(orb_image_decode(ctx, file.data, file.size, &made), ORB_OK);
-      assert_true(made.width == WIDTH && made.height == HEIGHT);
-      for (int p = 0; p < WIDTH * HEIGHT; p++) {
-        unsigned char wanted[4];
-        pixel_of(&kinds[i], p % WIDTH, p / WIDTH, wanted);
-        assert_memory_equal(made.rgba + (size_t)4 * (size_t)p, wanted, 4);
-      }
-      orb_free(ctx, made.rgba);
+      assert_int_equal(orb_image_decode(*state, file.data, file.size - IEND - 12, &made), ORB_E_CORRUPT);
+      assert_null(made.rgba);
       free(file.data);
     }
   }
@@ -246,6 +265,7 @@ static void cancelling_is_no_bad_picture(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(every_kind_of_png, setup, teardown),
+      cmocka_unit_test_setup_teardown(png_without_its_end, setup, teardown),
       cmocka_unit_test_setup_teardown(scans_have_a_limit, setup, teardown),
       cmocka_unit_test_setup_teardown(cancelling_is_no_bad_picture, setup, teardown),
   };

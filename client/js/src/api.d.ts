@@ -814,6 +814,14 @@ export type ProblemMalformedJson = {
   offset: number;
 };
 
+/** A part of a glTF document. */
+export type DocumentElement = {
+  /** Its place, such as meshes[0] or nodes[3]. */
+  where: string;
+  /** As the document names it; absent where it does not. */
+  name?: string;
+};
+
 /** A text file gives the line, a binary file the offset. */
 export type ProblemMalformedMesh = {
   type: '/problems/malformed-mesh';
@@ -831,6 +839,14 @@ export type ProblemMalformedMesh = {
   detail: string;
   /** The offset in bytes. */
   offset: number;
+  /** The number of the shape in the request, from 0. */
+  shape?: number;
+  /** The number of the entry of `transfer` in the request, from 0. */
+  transfer?: number;
+  /** How many parts of the shape's glTF document are at fault. */
+  element_count?: number;
+  /** The first of them. */
+  elements?: DocumentElement[];
 };
 
 export type ProblemMalformedEncoding = {
@@ -977,6 +993,8 @@ export type ProblemTooLarge = {
   landmarks?: number[];
   /** The number of the shape in the request, from 0. */
   shape?: number;
+  /** The number of the entry of `transfer` in the request, from 0. */
+  transfer?: number;
   /** The limit that a compressed body exceeds: unpacked size over packed size. */
   ratio_limit?: number;
 };
@@ -1156,6 +1174,12 @@ export type ProblemBadOption = {
   landmarks?: number[];
   /** The number of the shape in the request, from 0. */
   shape?: number;
+  /** The number of the entry of `transfer` in the request, from 0. */
+  transfer?: number;
+  /** How many parts of the shape's glTF document are at fault. */
+  element_count?: number;
+  /** The first of them. */
+  elements?: DocumentElement[];
 };
 
 export type ProblemUnknownMember = {
@@ -1174,6 +1198,8 @@ export type ProblemInvalidRequest = {
   status: 422;
   /** What is wrong and what to do. */
   detail: string;
+  /** The number of the entry of `transfer` in the request, from 0. */
+  transfer?: number;
 };
 
 export type ProblemUnsupportedMethod = {

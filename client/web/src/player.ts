@@ -89,11 +89,24 @@ class Player {
 
   /** of the targets, as they are shown */
   weights: ArrayLike<number> = [];
+  /** without those of targets that are no shapes */
+  private way: ArrayLike<number> = [];
 
-  private setWeights(weights: ArrayLike<number>) {
+  private setWeights(way: ArrayLike<number>) {
+    this.way = way;
+    const weights = Array.from(way);
+    this.result?.data.extras.forEach(({ at }, i) => (weights[at] = this.result!.extras[i]));
     this.weights = weights;
     this.result?.main.weights(weights);
     stage.draw();
+  }
+
+  /** Sets the weight of a target that is no shape, wherever the morph is. */
+  setExtra(number: number, weight: number) {
+    if (!this.result) return;
+    this.result.extras[number] = weight;
+    this.setWeights(this.way);
+    set();
   }
 
   private tintAt(time: number) {

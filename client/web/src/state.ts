@@ -121,9 +121,11 @@ export interface Result {
   supermesh: Supermesh;
   request: SupermeshRequest | null;
   matches: Matches | null;
-  data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles' | 'looks'>;
+  data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles' | 'looks' | 'extras'>;
   /** which of the looks is shown */
   look: number;
+  /** the weights of the targets that are no shapes, as they are shown */
+  extras: number[];
   main: Model;
   each: Model[];
   /** the shapes, painted by how much the morph stretches them, once that is measured */

@@ -3,7 +3,8 @@
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
  * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), go=1: the job is sent once the fast
  * one is computed, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
- * cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: the variant of its materials.
+ * cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: of its materials, e: the weights of its
+ * targets that are no shapes.
  */
 import type { Place } from 'orbmorph';
 import {
@@ -95,6 +96,12 @@ function encodeMatch(): string {
   return [best.id, shown?.at ?? 0, ...(next ? [next.at] : [])].join(',');
 }
 
+/** The weights of the targets that are no shapes, unless they are those of the asset. */
+function encodeExtras(): string {
+  const { data, extras = [] } = state.result ?? {};
+  return data?.extras.some(({ weight }, i) => weight !== extras[i]) ? extras.map(round).join(',') : '';
+}
+
 /** The best match that a URL names, and the numbers of those that are shown and computed. */
 async function decodeMatch(text: string): Promise<{ shown?: Matches; next?: Matches }> {
   const [id, ...numbers] = text.split(',');
@@ -128,6 +135,7 @@ function encode(): string {
   if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
   put('x', encodeTaken());
   if (state.result?.look) put('look', String(state.result.look));
+  put('e', encodeExtras());
   if (state.paint !== 'direction') put('paint', state.paint);
   if (state.side !== 'before') put('side', state.side);
   if (state.show !== 'morph') put('show', state.show);
@@ -215,7 +223,8 @@ export async function restore() {
       ]);
       next = matches.next;
       const look = Number(query.get('look')) || 0;
-      if (supermesh) await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown, look });
+      const extras = (query.get('e') ?? '').split(',').flatMap((text) => (text ? [Number(text) || 0] : []));
+      if (supermesh) await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown, look, extras });
       else if (!state.problem)
         set({
           problem: {

@@ -121,8 +121,9 @@ typedef struct orb_document {
 /* As orb_asset_write_template(), where the first shape came as glTF or GLB: appends that document as a GLB, with
  * targets added to the meshes that the closed surface consists of. The bytes of its first buffer stay, and so does all
  * else: nodes, skins, weights, materials, animations, extensions. Existing targets come first; mesh.extras.firstShape
- * is the number of the first target that is a shape. Targets are in the coordinates of each mesh. *vertices: those of
- * the triangle primitives of all meshes, one after another.
+ * is the number of the first target that is a shape. Where such a mesh is compressed, the document is unpacked, and
+ * says so in *list. Targets are in the coordinates of each mesh. *vertices: those of the triangle primitives of all
+ * meshes, one after another.
  *
  * *list (allocated from the context, freed by the caller, NULL if empty) has *count entries: what the asset lacks. Free
  * it on an error, too. ORB_E_BAD_OPTION: the document cannot be kept; the message says why. */

@@ -21,6 +21,12 @@ typedef struct orb_context orb_context;
 
 enum { ORB_ERROR_ITEMS = 100, ORB_ERROR_LOOP_VERTICES = 16384 };
 
+/* A part of a glTF document. */
+typedef struct orb_error_element {
+  char where[32]; /* such as "meshes[0]" */
+  char name[64];  /* as the document names it; "": not at all */
+} orb_error_element;
+
 /* The facts of a failure. Numbers that do not apply are −1, counts 0. Vertex numbers are those of the file. */
 typedef struct orb_error {
   orb_status status;
@@ -39,7 +45,11 @@ typedef struct orb_error {
   int64_t components[ORB_ERROR_ITEMS];
   int32_t landmark_count; /* bad-landmarks: their indices in the request */
   int32_t landmarks[ORB_ERROR_ITEMS];
-  int32_t shape; /* the offending shape, −1 if none in particular */
+  int32_t shape;         /* the offending shape, −1 if none in particular */
+  int32_t transfer;      /* the offending entry of "transfer", −1 likewise */
+  int64_t element_total; /* offending parts of the shape's glTF document; `elements` holds the first of them */
+  int32_t element_count;
+  orb_error_element elements[ORB_ERROR_ITEMS];
   /* not-genus-zero: closed walks along edges of the file. Each handle has one, until the arrays are full. Loop i has
    * the vertices loop_vertices[loop_start[i]] … loop_vertices[loop_start[i + 1] − 1], each once. */
   int32_t loop_count, loop_start[ORB_ERROR_ITEMS + 1];

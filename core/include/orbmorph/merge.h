@@ -133,6 +133,11 @@ typedef struct orb_merge_result {
 ORB_API ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                                             int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_merge_options *options, orb_merge_result *out);
+/* What orb_merge() would refuse because of the options or of the files: it calls this first, so that such a refusal
+ * comes before the work. The error names the shape, the entry of `carries` and the parts of the glTF document at fault.
+ * A document is read once more, in memory of its size. */
+ORB_API ORB_MUST_CHECK orb_status orb_merge_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                                  const orb_merge_options *options);
 /* Merges with an alignment that orb_align() or orb_alignment_read() gave for these shapes and landmarks. The result is
  * that of orb_merge(), but timings.align is 0. Takes *alignment over and zeroes it, also on an error. */
 ORB_API ORB_MUST_CHECK orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes,

@@ -17,8 +17,8 @@ async function load(file) {
   return new Promise((resolve) => loaded.exports({ onModuleLoaded: (module) => resolve({ module }) }));
 }
 
-/** A GLB of one primitive that Draco has compressed, with Google's encoder. */
-export async function draco({ positions, triangles }) {
+/** A GLB of one primitive that Draco has compressed, with Google's encoder. colors: four bytes a vertex. */
+export async function draco({ positions, triangles, colors }) {
   const { module } = await load(encoder);
   const made = new module.Encoder();
   const mesh = new module.Mesh();
@@ -31,6 +31,11 @@ export async function draco({ positions, triangles }) {
     3,
     new Float32Array(positions.flat()),
   );
+  const ids = { POSITION: id };
+  if (colors) {
+    const bytes = new Uint8Array(colors.flat());
+    ids.COLOR_0 = builder.AddUInt8Attribute(mesh, module.COLOR, positions.length, 4, bytes);
+  }
   made.SetAttributeQuantization(module.POSITION, 14);
   const out = new module.DracoInt8Array();
   const length = made.EncodeMeshToDracoBuffer(mesh, out);
@@ -45,14 +50,15 @@ export async function draco({ positions, triangles }) {
     accessors: [
       { componentType: 5126, type: 'VEC3', count: positions.length, min: range(Math.min), max: range(Math.max) },
       { componentType: 5125, type: 'SCALAR', count: 3 * triangles.length },
+      ...(colors ? [{ componentType: 5121, normalized: true, type: 'VEC4', count: positions.length }] : []),
     ],
     meshes: [
       {
         primitives: [
           {
-            attributes: { POSITION: 0 },
+            attributes: { POSITION: 0, ...(colors && { COLOR_0: 2 }) },
             indices: 1,
-            extensions: { KHR_draco_mesh_compression: { bufferView: 0, attributes: { POSITION: id } } },
+            extensions: { KHR_draco_mesh_compression: { bufferView: 0, attributes: ids } },
           },
         ],
       },

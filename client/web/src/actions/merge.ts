@@ -259,7 +259,7 @@ export function cancelMerge() {
 /**
  * Shows a morph. `keep`: in place of the shown one, with its time, mixture and view. `signal`: if aborted meanwhile,
  * nothing changes. `matches`: those among which it is one; by default those that its answer lists. `look`: of its
- * materials, see MorphData.
+ * materials, see MorphData. `extras`: the weights of its targets that are no shapes; by default those of the asset.
  */
 export async function openResult(
   supermesh: Supermesh,
@@ -269,12 +269,14 @@ export async function openResult(
     signal,
     matches,
     look = 0,
-  }: { keep?: boolean; signal?: AbortSignal; matches?: Matches; look?: number } = {},
+    extras,
+  }: { keep?: boolean; signal?: AbortSignal; matches?: Matches; look?: number; extras?: number[] } = {},
 ) {
   if (!keep) set({ loading: 'Loading the morph' });
   try {
     const buffer = await client.asset(supermesh.id, { signal });
-    const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length, look);
+    const carried = (supermesh.transferred ?? []).filter(({ what }) => what === 'targets').length;
+    const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length, look, carried);
     if (signal?.aborted) return;
     const { playing, mix, show, side, result: before } = state;
     const { time } = player;
@@ -296,8 +298,10 @@ export async function openResult(
         vertices: data.vertices,
         triangles: data.triangles,
         looks: data.looks,
+        extras: data.extras,
       },
-      look,
+      look: Math.min(look, Math.max(data.looks.length - 1, 0)),
+      extras: data.extras.map(({ weight }, i) => extras?.[i] ?? weight),
     };
     result.each.forEach((model, i) => {
       model.weights(result.data.shapes[i] ?? []);
@@ -333,6 +337,7 @@ export async function showLook(look: number) {
       signal,
       matches: result.matches ?? undefined,
       look,
+      extras: result.extras,
     });
   } catch (error) {
     if (!signal.aborted) toast(explain(error), 'error');

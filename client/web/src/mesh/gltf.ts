@@ -23,6 +23,7 @@ interface Primitive {
 }
 interface Node {
   mesh?: number;
+  weights?: number[];
   skin?: number;
   children?: number[];
   matrix?: number[];
@@ -200,26 +201,33 @@ export class Gltf {
     return new Blob([this.buffers[view.buffer].slice(start, start + view.byteLength) as BlobPart], { type });
   }
 
-  /** For each mesh, the matrix of the first node that uses it. */
-  private matrices(): Map<number, number[]> {
+  /** For each mesh, the matrices of the nodes that show it. */
+  private matrices(): Map<number, number[][]> {
     const { json } = this;
-    const found = new Map<number, number[]>();
+    const found = new Map<number, number[][]>();
     const nodes = json.nodes ?? [];
     const child = new Set(nodes.flatMap((node) => node.children ?? []));
     const roots = json.scenes?.[json.scene ?? 0]?.nodes ?? nodes.map((_, i) => i).filter((i) => !child.has(i));
-    const stack = roots.map((node) => ({ node, matrix: IDENTITY, depth: 0 }));
+    const stack = roots.map((node) => ({ node, matrix: IDENTITY, depth: 0 })).reverse(); // the first one is on top
     while (stack.length) {
       const { node, matrix, depth } = stack.pop()!;
       if (!nodes[node] || depth > 64) continue;
       const world = multiply(matrix, localMatrix(nodes[node]));
       const { mesh } = nodes[node];
-      if (mesh !== undefined && !found.has(mesh)) found.set(mesh, world);
-      for (const next of nodes[node].children ?? []) stack.push({ node: next, matrix: world, depth: depth + 1 });
+      if (mesh !== undefined) found.set(mesh, [...(found.get(mesh) ?? []), world]);
+      const below = [...(nodes[node].children ?? [])].reverse();
+      for (const next of below) stack.push({ node: next, matrix: world, depth: depth + 1 });
     }
     return found;
   }
 
-  /** All triangle primitives, meshes in file order. */
+  /** Triangle primitives wherever the scene shows them. */
+  shown(parts: Part[]): Part[] {
+    const matrices = this.matrices();
+    return parts.flatMap((part) => (matrices.get(part.mesh) ?? []).map((matrix) => ({ ...part, matrix })));
+  }
+
+  /** All triangle primitives, meshes in file order, where the first node has them. */
   triangles(): Part[] {
     const matrices = this.matrices();
     const parts: Part[] = [];
@@ -230,7 +238,7 @@ export class Gltf {
         let index: Uint32Array;
         if (primitive.indices !== undefined) index = this.integers(primitive.indices);
         else index = Uint32Array.from({ length: position.length / 3 }, (_, i) => i);
-        parts.push({ position, index, matrix: matrices.get(number) ?? IDENTITY, primitive, mesh: number });
+        parts.push({ position, index, matrix: matrices.get(number)?.[0] ?? IDENTITY, primitive, mesh: number });
       }
     });
     return parts;

@@ -3,10 +3,30 @@ import { dressOf, skinOf, tried, type Skin } from './dress';
 import { type Gltf, type Part, readGlb } from './gltf';
 import { edgesOf, smoothNormals, type Frame } from './geometry';
 
+/** What the materials of a morph can look like. variant: of the asset's materials; −1: those of its primitives. */
+export interface Look {
+  name: string;
+  variant: number;
+}
+
+/** A target that is no shape: it came with a file. */
+export interface Extra {
+  name: string;
+  /** among the targets of MorphData */
+  at: number;
+  /** among the targets of the primitives */
+  target: number;
+  /** the weight that the asset gives it */
+  weight: number;
+}
+
 export interface MorphData {
   names: string[];
-  /** the names of the variants of its materials, the first shape's own first; empty without variants */
-  looks: string[];
+  /** empty where there is nothing to choose from */
+  looks: Look[];
+  extras: Extra[];
+  /** what morphs comes first; the rest stays as it is */
+  moving: { vertices: number; corners: number };
   vertices: number;
   triangles: number;
   frame: Frame;
@@ -38,21 +58,25 @@ function joined(arrays: Float32Array[]): Float32Array {
   return out;
 }
 
-/** A part of the surface that morphs. */
-interface Moving extends Part {
-  /** the number of its first target that is a shape */
-  first: number;
+/** A part of what is drawn. */
+interface Drawn extends Part {
+  /** the number of its first target that is a shape; undefined: it stays as it is */
+  first?: number;
 }
 
-/** What morphs: the mesh of an asset, or in an uploaded document that has got targets those meshes that have. */
-function movingParts(gltf: Gltf): Moving[] {
+/**
+ * What morphs: the mesh of an asset, or in an uploaded document that has got targets those meshes that have. The rest of
+ * such a document follows, such as eyes and clothes, wherever its scene shows them.
+ */
+function drawnParts(gltf: Gltf): { moving: (Drawn & { first: number })[]; still: Drawn[] } {
   const all = gltf.triangles();
   const first = (part: Part) => gltf.json.meshes?.[part.mesh].extras?.firstShape;
   const kept = all.filter((part) => first(part) !== undefined);
-  return (kept.length ? kept : all.filter((part) => part.mesh === all[0].mesh)).map((part) => ({
-    ...part,
-    first: first(part) ?? 0,
-  }));
+  const moving = kept.length ? kept : all.filter((part) => part.mesh === all[0].mesh);
+  return {
+    moving: moving.map((part) => ({ ...part, first: first(part) ?? 0 })),
+    still: kept.length ? gltf.shown(all.filter((part) => first(part) === undefined)) : [],
+  };
 }
 
 /** Points (w = 1) or ways (w = 0) of a mesh in the scene. */
@@ -86,7 +110,7 @@ function normalsInScene(values: Float32Array, more: Float32Array | null, m: numb
 }
 
 /** The triangles of all parts, facing as they do in the scene. */
-function joinedIndex(parts: Moving[]): Uint32Array {
+function joinedIndex(parts: Drawn[]): Uint32Array {
   const index = new Uint32Array(parts.reduce((n, part) => n + part.index.length, 0));
   let at = 0;
   let base = 0;
@@ -101,59 +125,86 @@ function joinedIndex(parts: Moving[]): Uint32Array {
   return index;
 }
 
-/** The parts with the materials of a variant. */
-const dressedAs = (parts: Moving[], look: number): Moving[] =>
-  parts.map((part) => {
-    const { mappings = [] } = part.primitive.extensions?.KHR_materials_variants ?? {};
-    const material = mappings.find(({ variants }) => variants.includes(look))?.material ?? part.primitive.material;
-    return { ...part, primitive: { ...part.primitive, material } };
-  });
+/** The material of a part in a variant. */
+const materialIn = ({ primitive }: Drawn, variant: number) =>
+  primitive.extensions?.KHR_materials_variants?.mappings?.find(({ variants }) => variants.includes(variant))
+    ?.material ?? primitive.material;
+
+/** The variants of the materials, and before them those that the primitives name, unless the first variant has them. */
+function looksOf({ json }: Gltf, parts: Drawn[]): Look[] {
+  const variants = json.extensions?.KHR_materials_variants?.variants ?? [];
+  const looks = variants.map(({ name }, variant) => ({ name, variant }));
+  const isOwn = parts.every((part) => materialIn(part, 0) === part.primitive.material);
+  return isOwn || !looks.length ? looks : [{ name: 'As in the file', variant: -1 }, ...looks];
+}
+
+/** The parts with the materials of a look. */
+const dressedAs = <T extends Drawn>(parts: T[], look: Look | undefined): T[] =>
+  parts.map((part) => ({ ...part, primitive: { ...part.primitive, material: materialIn(part, look?.variant ?? -1) } }));
+
+/** What a target does to a part, by its number in the primitives: nothing to what stays as it is. */
+function targetOf(gltf: Gltf, part: Drawn, target: number, place: Float32Array, normal: Float32Array) {
+  const { POSITION, NORMAL } = (part.first === undefined ? undefined : part.primitive.targets?.[target]) ?? {};
+  if (POSITION === undefined)
+    return { position: new Float32Array(place.length), normal: new Float32Array(place.length) };
+  const position = inScene(gltf.floats(POSITION), part.matrix, 0);
+  const own = part.primitive.attributes.NORMAL;
+  const there =
+    own !== undefined && NORMAL !== undefined
+      ? normalsInScene(gltf.floats(own), gltf.floats(NORMAL), part.matrix)
+      : smoothNormals(
+          place.map((x, i) => x + position[i]),
+          joinedIndex([part]),
+        );
+  return { position, normal: there.map((x, i) => x - normal[i]) };
+}
 
 /**
- * Targets 0 … shapeCount − 2 are the other shapes; the rest are in-betweens of a curved path, and those that came with
- * the files. look: the variant of the materials.
+ * Targets 0 … shapeCount − 2 are the other shapes. In-betweens of a curved path follow, then the targets that came with
+ * the files: `carried` of them, and last those that an uploaded document had before the shapes. look: one of its looks.
  */
-export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0): MorphData {
+export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0, carried = 0): MorphData {
   const gltf = readGlb(buffer);
-  const parts = dressedAs(movingParts(gltf), look);
-  if (!parts.length) throw new Error('The asset has no triangles.');
-  const targetCount = (parts[0].primitive.targets?.length ?? 0) - parts[0].first;
-  const position = joined(parts.map((p) => inScene(p.position, p.matrix, 1)));
+  const { moving, still } = drawnParts(gltf);
+  if (!moving.length) throw new Error('The asset has no triangles.');
+  const looks = looksOf(gltf, [...moving, ...still]);
+  const parts = dressedAs<Drawn>([...moving, ...still], looks[look]);
+  const { first: had, primitive } = moving[0];
+  const fresh = (primitive.targets?.length ?? 0) - had;
+  const targetCount = fresh + had;
   const index = joinedIndex(parts);
-  const hasNormals = parts.every((p) => p.primitive.attributes.NORMAL !== undefined);
-  const normal = hasNormals
-    ? joined(parts.map((p) => normalsInScene(gltf.floats(p.primitive.attributes.NORMAL), null, p.matrix)))
-    : smoothNormals(position, index);
-  const targets = Array.from({ length: targetCount }, (_, k) => {
-    const of = (p: Moving) => p.primitive.targets![p.first + k];
-    const delta = joined(parts.map((p) => inScene(gltf.floats(of(p).POSITION), p.matrix, 0)));
-    const withNormals = hasNormals && parts.every((p) => of(p).NORMAL !== undefined);
-    const there = withNormals
-      ? joined(
-          parts.map((p) => {
-            const base = gltf.floats(p.primitive.attributes.NORMAL);
-            return normalsInScene(base, gltf.floats(of(p).NORMAL), p.matrix);
-          }),
-        )
-      : smoothNormals(
-          position.map((x, i) => x + delta[i]),
-          index,
-        );
-    return { position: delta, normal: there.map((x, i) => x - normal[i]) };
+  const places = parts.map((p) => inScene(p.position, p.matrix, 1));
+  const turned = parts.map((p, i) => {
+    const { NORMAL } = p.primitive.attributes;
+    return NORMAL === undefined
+      ? smoothNormals(places[i], joinedIndex([p]))
+      : normalsInScene(gltf.floats(NORMAL), null, p.matrix);
   });
+  const targets = Array.from({ length: targetCount }, (_, k) => {
+    const moves = parts.map((p, i) => targetOf(gltf, p, targetAt(k, had, fresh), places[i], turned[i]));
+    return { position: joined(moves.map((m) => m.position)), normal: joined(moves.map((m) => m.normal)) };
+  });
+  const [position, normal] = [joined(places), joined(turned)];
 
   const dress = tried(() => dressOf(gltf, parts));
-  const shapes = Array.from({ length: Math.min(shapeCount, targetCount + 1) }, (_, i) => single(i - 1, targetCount));
-  const path = animationPath(gltf, parts[0].first, targetCount, shapes);
-  const names = targetNames(gltf, parts[0], targetCount);
+  const shapes = Array.from({ length: Math.min(shapeCount, fresh + 1) }, (_, i) => single(i - 1, targetCount));
+  const path = animationPath(gltf, had, fresh, shapes);
+  const names = targetNames(gltf, moving[0].mesh, targetCount, (k) => targetAt(k, had, fresh));
+  const extras = names.flatMap((name, at) => {
+    const target = targetAt(at, had, fresh);
+    return at < fresh - carried ? [] : [{ name, at, target, weight: weightOf(gltf, moving[0].mesh, target) }];
+  });
   const frame = fit(position, targets, shapes);
   for (let i = 0; i < position.length; i++) position[i] = (position[i] - frame.center[i % 3]) / frame.radius;
   for (const target of targets) for (let i = 0; i < position.length; i++) target.position[i] /= frame.radius;
+  const count = moving.reduce((n, p) => n + p.position.length / 3, 0);
   return {
     names,
-    looks: (gltf.json.extensions?.KHR_materials_variants?.variants ?? []).map(({ name }) => name),
-    vertices: position.length / 3,
-    triangles: index.length / 3,
+    moving: { vertices: count, corners: moving.reduce((n, p) => n + p.index.length, 0) },
+    looks,
+    extras,
+    vertices: count,
+    triangles: moving.reduce((n, p) => n + p.index.length / 3, 0),
     frame,
     position,
     normal,
@@ -167,9 +218,18 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number, look = 0): 
   };
 }
 
-function targetNames(gltf: Gltf, { mesh, first }: Moving, count: number): string[] {
+/** The number in the primitives of a target of MorphData, where those that a document `had` come last. */
+const targetAt = (k: number, had: number, fresh: number) => (k < fresh ? had + k : k - fresh);
+
+function targetNames(gltf: Gltf, mesh: number, count: number, at: (k: number) => number): string[] {
   const names = gltf.json.meshes?.[mesh]?.extras?.targetNames;
-  return Array.from({ length: count }, (_, k) => names?.[first + k] ?? `target ${k + 1}`);
+  return Array.from({ length: count }, (_, k) => names?.[at(k)] ?? `target ${k + 1}`);
+}
+
+/** The weight of a target at rest. */
+function weightOf({ json }: Gltf, mesh: number, target: number): number {
+  const own = json.nodes?.find((node) => node.mesh === mesh)?.weights;
+  return (own ?? json.meshes?.[mesh]?.weights)?.[target] ?? 0;
 }
 
 /** The frame that contains every shape. */
@@ -223,19 +283,21 @@ export function pathOf(
   return straight;
 }
 
-/** The animation of the morph is the last: those of an uploaded document come before it, with `first` targets more. */
-function animationPath(gltf: Gltf, first: number, count: number, shapes: Float32Array[]) {
+/** The animation of the morph is the last: those of an uploaded document come before it. The targets that it `had` rest. */
+function animationPath(gltf: Gltf, had: number, count: number, shapes: Float32Array[]) {
   for (const animation of (gltf.json.animations ?? []).slice(-1)) {
     const channel = animation.channels.find((c) => c.target.path === 'weights');
     if (!channel || !count) continue;
     const sampler = animation.samplers[channel.sampler];
     const output = gltf.floats(sampler.output);
     const step = sampler.interpolation === 'CUBICSPLINE' ? 3 : 1;
-    const width = first + count;
+    const width = had + count;
     const keys = Math.floor(output.length / (width * step));
     const frames = Array.from({ length: keys }, (_, i) => {
-      const from = (i * step + (step === 3 ? 1 : 0)) * width + first;
-      return output.slice(from, from + count);
+      const from = (i * step + (step === 3 ? 1 : 0)) * width + had;
+      const frame = new Float32Array(width);
+      frame.set(output.subarray(from, from + count));
+      return frame;
     });
     return pathOf(frames, shapes);
   }

@@ -28,7 +28,8 @@ interface Held {
 }
 
 const held = new Map<string, Held>();
-const morphs = new Map<string, MorphData>();
+/** What morphs; drawn: how many vertices the page draws, which has more. */
+const morphs = new Map<string, MorphData & { drawn: number }>();
 const spheres = new Map<string, { surface: Float32Array; index: Uint32Array; place: Float32Array; bvh?: Bvh }>();
 
 export interface Spot {
@@ -84,6 +85,26 @@ function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
   return found;
 }
 
+/** A copy of what morphs, without a skin. */
+function movingOf(data: MorphData): MorphData {
+  const { vertices, corners } = data.moving;
+  return {
+    ...data,
+    position: data.position.slice(0, 3 * vertices),
+    index: data.index.slice(0, corners),
+    targets: data.targets.map((t) => ({ ...t, position: t.position.slice(0, 3 * vertices) })),
+    shapes: data.shapes.map((weights) => weights.slice()),
+    skin: undefined,
+  };
+}
+
+/** Values of vertices with zeros for those that stay as they are. */
+function padded(values: Float32Array, count: number): Float32Array {
+  const out = new Float32Array(count);
+  out.set(values);
+  return out;
+}
+
 const ops = {
   async open(key: string, buffer: ArrayBuffer): Promise<Display> {
     const raw = parseMesh(buffer);
@@ -116,7 +137,7 @@ const ops = {
 
   /** Each shape of a morph as the text of an OBJ file. */
   shapesOf(buffer: ArrayBuffer, count: number): string[] {
-    const { position, targets, index, shapes } = decodeMorph(buffer, count);
+    const { position, targets, index, shapes } = movingOf(decodeMorph(buffer, count));
     const faces: string[] = [];
     for (let c = 0; c < index.length; c += 3) faces.push(`f ${index[c] + 1} ${index[c + 1] + 1} ${index[c + 2] + 1}\n`);
     return shapes.map((weights) => {
@@ -219,17 +240,11 @@ const ops = {
     return { lines, points, triangles: Float32Array.from(flat), found };
   },
 
-  async morph(key: string, buffer: ArrayBuffer, shapeCount: number, look = 0): Promise<MorphData> {
-    const data = decodeMorph(buffer, shapeCount, look);
+  /** carried: how many targets the asset got from the files */
+  async morph(key: string, buffer: ArrayBuffer, shapeCount: number, look = 0, carried = 0): Promise<MorphData> {
+    const data = decodeMorph(buffer, shapeCount, look, carried);
     morphs.clear();
-    morphs.set(key, {
-      ...data,
-      position: data.position.slice(),
-      index: data.index.slice(),
-      targets: data.targets.map((t) => ({ ...t, position: t.position.slice() })),
-      shapes: data.shapes.map((weights) => weights.slice()),
-      skin: undefined,
-    });
+    morphs.set(key, { ...movingOf(data), drawn: data.position.length / 3 });
     await decodeImages(data.skin);
     return data;
   },
@@ -248,7 +263,7 @@ const ops = {
   /** How much a morph stretches its surface at each drawn vertex, for each shape. */
   stretch(key: string): Float32Array[] {
     const morph = morphs.get(key);
-    return morph ? stretchOf(morph) : [];
+    return morph ? stretchOf(morph).map((values) => padded(values, morph.drawn)) : [];
   },
 
   /**
@@ -279,7 +294,7 @@ const ops = {
 
   /** For each proposed landmark a point on every shape, in the shape's file coordinates. The asset has `fit` none. */
   propose(buffer: ArrayBuffer, shapeCount: number, count: number): [number, number, number][][] {
-    return proposeLandmarks(decodeMorph(buffer, shapeCount), count);
+    return proposeLandmarks(movingOf(decodeMorph(buffer, shapeCount)), count);
   },
 
   /** The surface and the sphere in a PLY from the daemon. Keeps them under `key` for sphereSpots(). */
@@ -374,7 +389,7 @@ const ops = {
     const display = buildDisplay(raw);
     const values = new Float32Array(display.position.length / 3);
     for (let c = 0; c < raw.corners.length; c++) values[display.index[c]] = distance[raw.corners[c]];
-    return { values, made, max, rms: Math.sqrt(sum / Math.max(count, 1)) };
+    return { values, made: padded(made, morph.drawn), max, rms: Math.sqrt(sum / Math.max(count, 1)) };
   },
 };
 

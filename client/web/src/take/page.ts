@@ -9,6 +9,10 @@ export interface Settings {
   seconds: number;
   easing: string;
   loop: string;
+  /** of the materials; -1: those of the primitives */
+  variant: number;
+  /** weights of targets of the primitives that are no shapes */
+  extras: { target: number; weight: number }[];
   camera: Record<'yaw' | 'pitch' | 'distance' | 'panX' | 'panY', number>;
 }
 

@@ -2,7 +2,7 @@
  * The player of a downloaded page: shows a morph with WebGL 2 and nothing else. The studio also draws pictures and films
  * with it. The page contains the text of this file, so it imports nothing.
  *
- * A morph is a GLB as orbmorph writes it: one mesh, its primitives with the same morph targets, and an animation whose
+ * A morph is a GLB as orbmorph writes it: meshes whose primitives have the same morph targets, and an animation whose
  * keyframes each show one target or none.
  */
 
@@ -44,7 +44,7 @@ function parse(buffer) {
       Type === Float32Array || accessor.normalized
         ? new Float32Array(accessor.count * width)
         : new Uint32Array(accessor.count * width);
-    if (!bytes) return out;
+    if (!bytes) return withSparse(out, accessor, width);
     const scale = accessor.normalized
       ? 1 / (2 ** (8 * Type.BYTES_PER_ELEMENT - (accessor.componentType % 2 ? 0 : 1)) - 1)
       : 1;
@@ -55,6 +55,19 @@ function parse(buffer) {
       raw.set(all.subarray(from + i * stride, from + i * stride + raw.length));
       for (let k = 0; k < width; k++) out[i * width + k] = part[k] * scale;
     }
+    return withSparse(out, accessor, width);
+  };
+  /** Puts in the elements that a sparse accessor gives by their numbers. */
+  const withSparse = (out, { sparse, componentType }, width) => {
+    if (!sparse) return out;
+    const list = ({ bufferView, byteOffset = 0, componentType: type = componentType }, count) => {
+      const from = start + (json.bufferViews[bufferView].byteOffset ?? 0) + byteOffset;
+      return new ARRAY[type](buffer.slice(from, from + count * ARRAY[type].BYTES_PER_ELEMENT));
+    };
+    const values = list(sparse.values, sparse.count * width);
+    list(sparse.indices, sparse.count).forEach((at, i) =>
+      out.set(values.subarray(i * width, (i + 1) * width), at * width),
+    );
     return out;
   };
   const image = async (index) => {
@@ -65,14 +78,113 @@ function parse(buffer) {
   return { json, read, image };
 }
 
+/** The product of two matrices, column-major. */
+const times = (a, b) =>
+  Array.from({ length: 16 }, (_, i) =>
+    [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[4 * (i >> 2) + k], 0),
+  );
+
+function matrixOf({ matrix, translation: [tx, ty, tz] = [0, 0, 0], rotation = [0, 0, 0, 1], scale = [1, 1, 1] }) {
+  const [x, y, z, w] = rotation;
+  const columns = [
+    [1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)],
+    [2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)],
+    [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)],
+  ];
+  return matrix ?? [...columns.flatMap((column, c) => [...column.map((v) => v * scale[c]), 0]), tx, ty, tz, 1];
+}
+
+/** The matrices to the scene of the nodes that show each mesh. */
+function matricesOf({ nodes = [], scenes, scene = 0 }) {
+  const found = new Map();
+  const below = new Set(nodes.flatMap(({ children = [] }) => children));
+  const roots = scenes?.[scene]?.nodes ?? [...nodes.keys()].filter((node) => !below.has(node));
+  const stack = roots.map((node) => [node, matrixOf({}), 0]).reverse(); // the first one is on top
+  while (stack.length) {
+    const [node, above, depth] = stack.pop();
+    if (!nodes[node] || depth > 64) continue;
+    const to = times(above, matrixOf(nodes[node]));
+    const { mesh } = nodes[node];
+    if (mesh !== undefined) found.set(mesh, [...(found.get(mesh) ?? []), to]);
+    for (const child of [...(nodes[node].children ?? [])].reverse()) stack.push([child, to, depth + 1]);
+  }
+  return found;
+}
+
 /**
  * The primitives that morph, with those targets that are shapes: an uploaded document that has got targets may have
- * others first, and other meshes.
+ * others first. Its other meshes follow, which stay as they are. variant: of the materials; extras: other targets, with weights that stay.
  */
-function meshOf({ meshes }) {
-  const mesh = meshes.find(({ extras }) => extras?.firstShape !== undefined) ?? meshes[0];
-  const first = mesh.extras?.firstShape ?? 0;
-  return { first, primitives: mesh.primitives.map((p) => ({ ...p, targets: p.targets?.slice(first) })) };
+function meshOf({ json, read }, variant, extras) {
+  const kept = json.meshes.filter((mesh) => mesh.extras?.firstShape !== undefined);
+  const meshes = kept.length ? kept : json.meshes.slice(0, 1);
+  const first = meshes[0].extras?.firstShape ?? 0;
+  const matrices = matricesOf(json);
+  const dressed = (p) => {
+    const mappings = p.extensions?.KHR_materials_variants?.mappings ?? [];
+    return mappings.find(({ variants }) => variants.includes(variant))?.material ?? p.material;
+  };
+  const placed = (mesh) => matrices.get(json.meshes.indexOf(mesh)) ?? [];
+  const morphing = (p, m) => ({
+    ...p,
+    material: dressed(p),
+    targets: p.targets?.slice(first),
+    still: extras.map(({ target, weight }) => ({ ...p.targets?.[target], weight })),
+    ...toScene(m, read),
+  });
+  const staying = (p, m) => ({ ...p, material: dressed(p), targets: [], still: [], ...toScene(m, read) });
+  const isSurface = ({ mode = 4, attributes }) => mode === 4 && attributes.POSITION !== undefined;
+  const primitives = meshes.flatMap((mesh) => {
+    const [m = matrixOf({})] = placed(mesh);
+    return mesh.primitives.filter(isSurface).map((p) => morphing(p, m));
+  });
+  const others = kept.length ? json.meshes.filter((mesh) => !kept.includes(mesh)) : [];
+  for (const mesh of others)
+    for (const m of placed(mesh)) primitives.push(...mesh.primitives.filter(isSurface).map((p) => staying(p, m)));
+  return { first, primitives };
+}
+
+/** What reads places, ways and normals of a mesh in the scene. mirrored: its triangles face inwards there. */
+function toScene(m, read) {
+  const by = (columns, w) => (values) => {
+    const out = new Float32Array(values.length);
+    for (let i = 0; i < values.length; i += 3)
+      for (let r = 0; r < 3; r++)
+        out[i + r] =
+          columns[r] * values[i] +
+          columns[4 + r] * values[i + 1] +
+          columns[8 + r] * values[i + 2] +
+          w * columns[12 + r];
+    return out;
+  };
+  const minor = (r, c) => {
+    const at = (i, j) => m[4 * ((c + j) % 3) + ((r + i) % 3)];
+    return at(1, 1) * at(2, 2) - at(1, 2) * at(2, 1);
+  };
+  const mirrored = m[0] * minor(0, 0) + m[4] * minor(0, 1) + m[8] * minor(0, 2) < 0;
+  const turned = new Array(16).fill(0); // normals go by the cofactors
+  for (let r = 0; r < 3; r++) for (let c = 0; c < 3; c++) turned[4 * c + r] = (mirrored ? -1 : 1) * minor(r, c);
+  const normal = by(turned, 0);
+  const unit = (values) => {
+    const out = normal(values);
+    for (let i = 0; i < out.length; i += 3) {
+      const length = Math.hypot(out[i], out[i + 1], out[i + 2]) || 1;
+      for (let k = 0; k < 3; k++) out[i + k] /= length;
+    }
+    return out;
+  };
+  const [place, way] = [by(m, 1), by(m, 0)];
+  return {
+    mirrored,
+    places: (index) => place(read(index)),
+    ways: (index) => way(read(index)),
+    /** with the turn that a target adds */
+    normals: (index, turn) => {
+      const values = read(index);
+      const more = turn === undefined ? null : read(turn);
+      return unit(more ? values.map((x, i) => x + more[i]) : values);
+    },
+  };
 }
 
 /**
@@ -160,17 +272,21 @@ const linear = (hex) => [1, 3, 5].map((i) => (parseInt(hex.slice(i, i + 2), 16) 
 /** Uploads a primitive. The positions are placed in the unit ball by centre and radius. */
 async function partOf(gl, file, primitive, center, radius) {
   const { json, read, image } = file;
-  const { attributes, targets = [] } = primitive;
+  const { attributes, targets = [], still } = primitive;
   const upload = (data) => {
     const buffer = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
     return buffer;
   };
-  const position = read(attributes.POSITION);
+  const position = primitive.places(attributes.POSITION);
   const count = position.length / 3;
   const index =
-    primitive.indices === undefined ? Uint32Array.from({ length: count }, (_, i) => i) : read(primitive.indices);
+    primitive.indices === undefined
+      ? Uint32Array.from({ length: count }, (_, i) => i)
+      : Uint32Array.from(read(primitive.indices));
+  for (let i = 0; primitive.mirrored && i < index.length; i += 3)
+    [index[i + 1], index[i + 2]] = [index[i + 2], index[i + 1]];
   const normals = (at) => {
     const out = new Float32Array(at.length);
     for (let i = 0; i < index.length; i += 3) {
@@ -186,7 +302,8 @@ async function partOf(gl, file, primitive, center, radius) {
     }
     return out;
   };
-  const normal = attributes.NORMAL === undefined ? normals(position) : read(attributes.NORMAL);
+  const normal = attributes.NORMAL === undefined ? normals(position) : primitive.normals(attributes.NORMAL);
+  const base = still.length ? normal.slice() : normal;
   const material = json.materials?.[primitive.material] ?? {};
   const surface = material.pbrMetallicRoughness ?? {};
   const slot = surface.baseColorTexture;
@@ -221,24 +338,25 @@ async function partOf(gl, file, primitive, center, radius) {
     color = { buffer: upload(data), width: wide ? 4 : 3 };
   }
   const moved = targets.map((target) => {
-    const delta = read(target.POSITION);
-    let turn;
-    if (target.NORMAL !== undefined && attributes.NORMAL !== undefined) turn = read(target.NORMAL);
-    else {
-      turn = normals(position.map((x, i) => x + delta[i]));
-      for (let i = 0; i < turn.length; i++) turn[i] -= normal[i];
-    }
+    const delta = primitive.ways(target.POSITION);
+    const turn =
+      target.NORMAL !== undefined && attributes.NORMAL !== undefined
+        ? primitive.normals(attributes.NORMAL, target.NORMAL)
+        : normals(position.map((x, i) => x + delta[i]));
+    for (let i = 0; i < turn.length; i++) turn[i] -= normal[i];
     for (let i = 0; i < delta.length; i++) delta[i] /= radius;
     return { position: upload(delta), normal: upload(turn) };
   });
+  for (const { POSITION, NORMAL, weight } of still) {
+    const way = POSITION === undefined ? [] : primitive.ways(POSITION);
+    for (let i = 0; i < way.length; i++) position[i] += weight * way[i];
+    const turned = NORMAL === undefined ? [] : primitive.normals(attributes.NORMAL, NORMAL);
+    for (let i = 0; i < turned.length; i++) normal[i] += weight * (turned[i] - base[i]);
+  }
   for (let i = 0; i < position.length; i++) position[i] = (position[i] - center[i % 3]) / radius;
   const elements = gl.createBuffer();
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, elements);
-  gl.bufferData(
-    gl.ELEMENT_ARRAY_BUFFER,
-    index instanceof Uint32Array ? index : Uint32Array.from(index),
-    gl.STATIC_DRAW,
-  );
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
   const factor = surface.baseColorFactor ?? [1, 1, 1, 1];
   return {
     base: { position: upload(position), normal: upload(normal) },
@@ -255,13 +373,13 @@ async function partOf(gl, file, primitive, center, radius) {
 }
 
 /** The box of every shape: {center, radius}. */
-function frameOf({ read }, primitives, shapes) {
+function frameOf(primitives, shapes) {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
-  for (const { attributes, targets = [] } of primitives) {
-    const base = read(attributes.POSITION);
+  for (const { attributes, targets = [], places, ways } of primitives) {
+    const base = places(attributes.POSITION);
     for (let shape = 0; shape < shapes; shape++) {
-      const delta = shape ? read(targets[shape - 1].POSITION) : null;
+      const delta = shape && targets.length ? ways(targets[shape - 1].POSITION) : null;
       for (let i = 0; i < base.length; i++) {
         const x = base[i] + (delta ? delta[i] : 0);
         if (x < low[i % 3]) low[i % 3] = x;
@@ -275,16 +393,17 @@ function frameOf({ read }, primitives, shapes) {
 
 /**
  * Opens a morph on a canvas. settings: shapes (their number), tints (colours of shapes without material), seconds a
- * shape, easing, loop ("pingpong" or "loop"), and the camera: yaw, pitch, distance, panX, panY.
+ * shape, easing, loop ("pingpong" or "loop"), variant of the materials (-1: those of the primitives), extras (targets of
+ * the primitives that are no shapes, with weights), and the camera: yaw, pitch, distance, panX, panY.
  */
 export async function open(canvas, glb, settings) {
   const gl = canvas.getContext('webgl2', { antialias: true, alpha: true, preserveDrawingBuffer: true });
   if (!gl) throw new Error('This browser has no WebGL 2.');
   const file = parse(glb);
-  const { primitives, first } = meshOf(file.json);
+  const { primitives, first } = meshOf(file, settings.variant ?? -1, settings.extras ?? []);
   const targets = primitives[0].targets?.length ?? 0;
   const shapes = Math.min(settings.shapes ?? targets + 1, targets + 1);
-  const { center, radius } = frameOf(file, primitives, shapes);
+  const { center, radius } = frameOf(primitives, shapes);
   const parts = [];
   for (const primitive of primitives) parts.push(await partOf(gl, file, primitive, center, radius));
   const isTinted = parts.every((part) => part.plain); // grey all over: the file says nothing of colours

@@ -250,6 +250,7 @@ export function MorphInspector() {
       {state.show === 'stretch' && <StretchLoader />}
       {state.show === 'error' && <ErrorLoader />}
       {(state.show === 'morph' || state.show === 'beside') && <Mix result={result} />}
+      {(state.show === 'morph' || state.show === 'beside') && <Extras result={result} />}
       <Looks result={result} />
       <div class="row wrap gap-top">
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
@@ -324,7 +325,7 @@ export function MorphInspector() {
   );
 }
 
-/** The variants of the materials: the first shape's own, and the baked textures of others. */
+/** The variants of the materials: those of the first shape, and the baked textures of others. */
 function Looks({ result: { data, look } }: { result: Result }) {
   if (data.looks.length < 2) return null;
   return (
@@ -334,7 +335,7 @@ function Looks({ result: { data, look } }: { result: Result }) {
         label="Look"
         value={String(look)}
         onChange={(value) => void showLook(Number(value))}
-        items={data.looks.map((label, i) => ({ value: String(i), label }))}
+        items={data.looks.map(({ name }, i) => ({ value: String(i), label: name }))}
       />
     </div>
   );
@@ -420,6 +421,34 @@ function Mix({ result }: { result: Result }) {
               }
               player.mix(values);
             }}
+          />
+        </label>
+      ))}
+    </fieldset>
+  );
+}
+
+/** A slider for each target that is no shape: those that came with the files. */
+function Extras({ result }: { result: Result }) {
+  const { extras } = result.data;
+  if (!extras.length) return null;
+  return (
+    <fieldset class="mix many">
+      <legend>Targets of the files</legend>
+      {extras.map(({ name, target }, i) => (
+        <label key={target} class="mix-row">
+          <span class="dot" aria-hidden="true" />
+          <span class="clip" title={name}>
+            {name}
+          </span>
+          <input
+            type="range"
+            min={Math.min(0, result.extras[i])}
+            max={Math.max(1, result.extras[i])}
+            step={0.01}
+            value={result.extras[i]}
+            aria-label={`Weight of ${name}`}
+            onInput={(event) => player.setExtra(i, Number(event.currentTarget.value))}
           />
         </label>
       ))}

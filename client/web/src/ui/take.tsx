@@ -22,7 +22,16 @@ function settingsOf(result: Result): Settings {
   const { yaw, pitch, distance, panX, panY } = stage.orbit;
   const names = result.supermesh.shapes.map((s) => s.name);
   const camera = { yaw, pitch, distance, panX, panY };
-  return { shapes: names.length, names, tints: names.map((_, i) => tint(i)), ...state.motion, camera };
+  const { looks, extras } = result.data;
+  return {
+    shapes: names.length,
+    names,
+    tints: names.map((_, i) => tint(i)),
+    ...state.motion,
+    variant: looks[result.look]?.variant ?? -1,
+    extras: extras.flatMap(({ target }, i) => (result.extras[i] ? [{ target, weight: result.extras[i] }] : [])),
+    camera,
+  };
 }
 
 const change = (motion: Partial<Motion>) => set({ motion: { ...state.motion, ...motion } });
