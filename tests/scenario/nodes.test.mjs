@@ -12,6 +12,7 @@ import { Cluster, LEASE } from './support/cluster.mjs';
 import { Collector } from './support/collector.mjs';
 import { assertProblem, endless, samples, until } from './support/daemon.mjs';
 import { haproxy, lacksHaproxy } from './support/haproxy.mjs';
+import { origin } from './support/origin.mjs';
 import { busy, half, late, lost, pass, s3Proxy } from './support/s3_proxy.mjs';
 import * as shapes from './support/shapes.mjs';
 
@@ -260,10 +261,64 @@ test('while PostgreSQL is away, requests get 503 and running jobs lose nothing',
   await c.check();
 });
 
+test('a deletion that comes to S3 late deletes nothing that another node has published since', async (t) => {
+  const c = new Cluster(t);
+  const proxy = await s3Proxy(t, process.env.ORB_S3, () => pass);
+  const b = await c.node('--role', 'serve');
+  c.objects = c.bucket.replace(process.env.ORB_S3, proxy.url);
+  const a = await c.node('--role', 'serve');
+  const body = newMesh();
+  const mesh = (await a.upload(body)).json;
+  let release;
+  let sent;
+  const held = new Promise((resolve) => (release = resolve));
+  t.after(() => release(pass));
+  const came = new Promise((resolve) => (sent = resolve));
+  proxy.decide = ({ method }) => {
+    if (method !== 'DELETE') return pass;
+    sent();
+    return held; // as if the node had been stopped before it sent it
+  };
+  const deleted = a.delete(mesh.url);
+  await came;
+  assert.equal(c.cutLock(), '1');
+  const again = await b.upload(body);
+  assert.equal(again.status, 201);
+  assert.equal(again.json.id, mesh.id);
+  release(pass);
+  assert.equal((await deleted).status, 204);
+  assert.match(await c.check(), /^1 rows and 1 objects checked: 0 wrong, 0 objects without a row/);
+  assert.match(a.log, /request came too late/);
+});
+
+test('a download whose node loses its lock again and again runs again', async (t) => {
+  const c = new Cluster(t);
+  const proxy = await s3Proxy(t, process.env.ORB_S3, () => pass);
+  c.objects = c.bucket.replace(process.env.ORB_S3, proxy.url);
+  const node = await c.node('--fetch-allow', '127.0.0.1');
+  const body = newMesh();
+  const { url } = await origin(t, (_, response) => response.end(body));
+  let cuts = 0;
+  // Between publishing and the commit of the row: at the upload, and whenever the node looks whether it is still there.
+  proxy.decide = ({ method, path: at }) => {
+    if (cuts < 5 && /mesh/.test(at) && (method === 'PUT' || method === 'HEAD')) {
+      c.cutLock();
+      cuts++;
+    }
+  };
+  const job = await node.post('/v1/meshes', { url });
+  assert.equal(job.status, 202);
+  const done = await node.ended(job.json);
+  assert.equal(done.state, 'succeeded', JSON.stringify(done));
+  assert.equal(cuts, 5);
+  assert.match(await c.check(), /^1 rows and 1 objects checked: 0 wrong/);
+});
+
 /** What clients of the cluster were promised. */
 class Ledger {
-  jobs = new Map(); // url → {job, mesh}
-  hashes = new Map(); // url of a sphere → its hash
+  jobs = new Map(); // url → job
+  meshes = [];
+  hashes = new Map(); // url of a result → its hash
 
   constructor(cluster) {
     this.cluster = cluster;
@@ -272,7 +327,15 @@ class Ledger {
   async submit(node) {
     const mesh = await node.upload(newMesh());
     if (mesh.status !== 201) return;
-    const reply = await node.post('/v1/embeddings', { mesh: mesh.json.id });
+    this.meshes.push(mesh.json.id);
+    await this.ask(node, '/v1/embeddings', { mesh: mesh.json.id });
+    if (this.meshes.length % 3) return;
+    const shapes = [this.meshes.at(-2), mesh.json.id].map((id) => ({ mesh: id }));
+    await this.ask(node, '/v1/supermeshes', { shapes, align: { method: 'rotate' } });
+  }
+
+  async ask(node, target, request) {
+    const reply = await node.post(target, request);
     if (reply.status === 202) this.jobs.set(reply.json.url, reply.json);
   }
 
@@ -285,7 +348,7 @@ class Ledger {
     for (const job of this.jobs.values()) {
       const done = await nodes[random(nodes.length)].ended(job, { seconds: 60 });
       assert.equal(done.state, 'succeeded', JSON.stringify(done));
-      const url = `${done.result}/sphere.ply`;
+      const url = `${done.result}/${done.kind === 'embedding' ? 'sphere.ply' : 'asset.glb'}`;
       const [one, other] = await Promise.all(nodes.slice(0, 2).map((node) => node.get(url)));
       assert.equal(one.status, 200, `${url}: ${one.bytes.toString().slice(0, 300)}`);
       const hash = createHash('sha256').update(one.bytes).digest('hex');

@@ -12,6 +12,7 @@ assert.ok(
   'to be run by with_postgresql.sh and with_s3.sh',
 );
 export const LEASE = 4; // seconds; a busy machine must not pause a node for so long
+const OBJECTS = 0x6f726d + 4; // SQL_LOCK_OBJECTS of server/store/sql.h
 
 /** Nodes that share a catalogue and a bucket. */
 export class Cluster {
@@ -65,6 +66,13 @@ export class Cluster {
 
   cut() {
     this.sql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name='orbmorphd'");
+  }
+
+  /** Cuts the connections that hold or wait for the lock of objects (server/store/object_lock.h). */
+  cutLock() {
+    return this.sql(
+      `SELECT count(pg_terminate_backend(pid, 10000)) FROM pg_locks WHERE locktype='advisory' AND objsubid=2 AND classid=${OBJECTS}`,
+    );
   }
 
   /** Every row has its object, and every object its row, but for what a node that died had just uploaded. */
