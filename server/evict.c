@@ -24,7 +24,6 @@ static store_result evict(const evict_env *env, resource_kind kind, const char *
     cache_drop(env->descriptions, kind, id);
   }
   FAULT_POINT("evict-row-gone");
-  gone = gone && objects_still_excludes(env->store); /* else the objects stay without a row, until --gc */
   if (result == STORE_OK && gone && kinds[kind] != OBJECT_KINDS) {
     result = objects_delete(env->store, kinds[kind], id);
   }
@@ -101,6 +100,13 @@ int evict_is_named(catalogue *cat, object_kind kind, const char *id) {
   }
   resource_free(&row);
   return named;
+}
+
+void evict_unnamed(catalogue *cat, objects *store, object_kind kind, const char *id) {
+  if (objects_exclude(store) && !evict_is_named(cat, kind, id)) {
+    objects_delete(store, kind, id);
+  }
+  objects_let_go(store);
 }
 
 static int is_named(void *cat, object_kind kind, const char *id) {

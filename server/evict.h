@@ -27,6 +27,8 @@ void evict_damaged(const evict_env *env, object_kind kind, const char *id);
 
 /* Whether a row names this object; also if that cannot be read. */
 int evict_is_named(catalogue *cat, object_kind kind, const char *id);
+/* Deletes a published object that got no row, unless there is one now. Not within objects_hold(). */
+void evict_unnamed(catalogue *cat, objects *store, object_kind kind, const char *id);
 /* Deletes the files that had to stay while a backup ran; does nothing while one runs. Blocks. */
 void evict_held(const evict_env *env);
 

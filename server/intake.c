@@ -209,18 +209,24 @@ static void drop_unused(catalogue *cat, objects *store, const char *id) {
   resource_free(&row);
 }
 
-enum { LOST_TRIES = 3 };
+/* Whether what was published before the hold was lost is there now. Otherwise its bytes are sent again. */
+static store_result publish_again(objects *store, const intake_file *file) {
+  objects_hold_again(store);
+  store_result there = objects_look(store, OBJECT_MESH, file->id);
+  if (there == STORE_NOT_FOUND) {
+    there = objects_put(store, OBJECT_MESH, file->id, file->bytes, (size_t)file->size);
+  }
+  return there;
+}
 
-/* Commits the row of a published mesh, whose file may be gone if the hold was lost. */
-static store_result put_row(catalogue *cat, objects *store, const resource *row, const char *tenant, int64_t quota,
-                            int *fresh) {
+/* Commits the row of a published mesh. A hold is lost only while the database is away, or its connections are cut. */
+static store_result put_row(const intake_file *file, catalogue *cat, objects *store, const resource *row,
+                            const char *tenant, int64_t quota, int *fresh) {
+  enum { LOST_TRIES = 3 };
   store_result stored = catalogue_put_for(cat, row, tenant, quota, fresh);
   for (int i = 0; stored == STORE_LOST && i < LOST_TRIES; i++) {
-    objects_hold_again(store);
-    if (objects_look(store, OBJECT_MESH, row->id) != STORE_OK) {
-      return STORE_LOST;
-    }
-    stored = catalogue_put_for(cat, row, tenant, quota, fresh);
+    stored = publish_again(store, file);
+    stored = stored == STORE_OK ? catalogue_put_for(cat, row, tenant, quota, fresh) : stored;
   }
   return stored;
 }
@@ -246,7 +252,7 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
   store_result stored = objects_publish(store, file->temp, OBJECT_MESH, file->id);
   FAULT_POINT("mesh-published");
   if (stored == STORE_OK) {
-    stored = put_row(cat, store, &row, tenant, quota, fresh);
+    stored = put_row(file, cat, store, &row, tenant, quota, fresh);
   }
   objects_let_go(store);
   resource_free(&row);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "evict.h"
 #include "store/owners.h"
@@ -71,13 +72,28 @@ static void each_row(tally *t, resource_kind kind) {
   }
 }
 
+/* The object may be published again meanwhile. What is in S3 is fetched before others have to wait. */
+static store_result set_aside(const tally *t, object_kind kind, const char *id) {
+  int fd;
+  uint64_t size;
+  if (objects_are_remote(t->store) && objects_read(t->store, kind, id, &fd, &size) == STORE_OK) {
+    close(fd);
+  }
+  store_result result = STORE_CONFLICT;
+  if (objects_exclude(t->store) && !evict_is_named(t->cat, kind, id)) {
+    result = objects_set_aside(t->store, kind, id);
+  }
+  objects_let_go(t->store);
+  return result;
+}
+
 /* A crash between publishing and commit leaves an object without a row, and so does a catalogue that lost rows. */
 static void each_object(void *user, object_kind kind, const char *id, uint64_t size) {
   tally *t = user;
   t->objects++;
   if (!evict_is_named(t->cat, kind, id)) {
     t->orphans++;
-    if (t->remove_orphans && objects_set_aside(t->store, kind, id) == STORE_OK) {
+    if (t->remove_orphans && set_aside(t, kind, id) == STORE_OK) {
       printf("moved object %s (%llu bytes), which has no row, to lost+found\n", id, (unsigned long long)size);
     }
   }

@@ -94,10 +94,21 @@ part_migrate() {
   ORBMORPHD="$PWD/build/bin/orbmorphd" tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/long/migrate.mjs
 }
 
-# Several nodes on PostgreSQL and S3, which are killed, paused and cut off, by turns.
+# The scenarios on three nodes behind haproxy, with PostgreSQL and S3; those of jobs and tenants also with PostgreSQL and
+# files. Then several nodes which are killed, paused and cut off, by turns.
 part_cluster() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
-  cmake --build build --target orbmorphd
+  cmake --build build --target orbmorphd orbmorph
+  local name
+  for name in meshes jobs supermeshes tenants eviction resume fairness embeddings lists landmarks conditions; do
+    echo "three nodes: $name"
+    ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh tests/tools/with_s3.sh tests/tools/with_nodes.sh \
+      node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
+  done
+  for name in jobs tenants; do
+    ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh \
+      node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
+  done
   ORB_ROUNDS=${ORB_ROUNDS:-500} ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh tests/tools/with_s3.sh \
     node --test --test-reporter=spec tests/scenario/nodes.test.mjs
 }

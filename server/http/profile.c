@@ -112,10 +112,10 @@ static store_result store_profile(request *r, const orb_buffer *bytes) {
     objects_hold_again(srv->store);
     stored = put_profile(r, kind, sha, bytes);
   }
-  if (stored == STORE_NOT_FOUND) { /* no other thread can have published it: this one has the flight */
-    objects_delete(srv->store, kind, r->id);
-  }
   objects_let_go(srv->store);
+  if (stored == STORE_NOT_FOUND) {
+    evict_unnamed(srv->cat, srv->store, kind, r->id);
+  }
   return stored;
 }
 

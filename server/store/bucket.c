@@ -98,6 +98,9 @@ static store_result ask(object_bucket *b, const s3_request *request, s3_answer *
     return STORE_AWAY;
   }
   s3_send(b->store, request, answer);
+  if (request->signed_at && answer->status == 403) {
+    return STORE_CONFLICT;
+  }
   store_result result = meaning(answer);
   if (result == STORE_AWAY || result == STORE_UNFIT) {
     set_away(b, 1, answer->why);
@@ -418,9 +421,17 @@ store_result bucket_look(object_bucket *b, const char *name, char sha[65], int64
   return result;
 }
 
-store_result bucket_delete(object_bucket *b, const char *name) {
-  const s3_request request = {.method = "DELETE", .key = name, .to = -1, .tries = 2};
+int64_t bucket_clock(object_bucket *b) {
+  return s3_clock(b->store);
+}
+
+store_result bucket_delete(object_bucket *b, const char *name, int64_t signed_at) {
+  const s3_request request = {
+      .method = "DELETE", .key = name, .to = -1, .tries = 2, .signed_at = signed_at, .seconds = BUCKET_DELETE_S};
   store_result result = ask_only(b, &request);
+  if (result == STORE_CONFLICT) {
+    log_warn("S3 did not delete %s: the request came too late; it is sent again", name);
+  }
   return result == STORE_NOT_FOUND ? STORE_OK : result;
 }
 

@@ -33,8 +33,12 @@ store_result bucket_put(object_bucket *b, const char *name, int fd);
 store_result bucket_get(object_bucket *b, const char *name, int fd, uint64_t *size);
 /* sha: of the object as it was uploaded; modified: when, a Unix time. Either may be NULL. */
 store_result bucket_look(object_bucket *b, const char *name, char sha[65], int64_t *modified);
-/* Also STORE_OK if there is no such object. */
-store_result bucket_delete(object_bucket *b, const char *name);
+/* Also STORE_OK if there is no such object. signed_at: 0, or a time of bucket_clock(): S3 refuses the request when more
+ * than BUCKET_DELETE_S have passed since then (STORE_CONFLICT), however long this process or its request was held up.
+ */
+enum { BUCKET_DELETE_S = 5 };
+store_result bucket_delete(object_bucket *b, const char *name, int64_t signed_at);
+int64_t bucket_clock(object_bucket *b); /* see s3_clock() */
 /* Calls `each` for every object but the owner's. */
 store_result bucket_each(object_bucket *b, void (*each)(void *user, const char *name, uint64_t size), void *user);
 /* See s3_link(). */

@@ -319,7 +319,7 @@ static void sweep_object(void *user, object_kind kind, const char *id, uint64_t 
   if (code == SQL_DONE) {
     objects_name(kind, id, name);
     store_result deleted =
-        s->m->to.files ? objects_delete(s->m->to.files, kind, id) : bucket_delete(s->m->to.bucket, name);
+        s->m->to.files ? objects_delete(s->m->to.files, kind, id) : bucket_delete(s->m->to.bucket, name, 0);
     s->counts->removed += deleted == STORE_OK;
     s->result = deleted == STORE_OK ? s->result : deleted;
   }

@@ -4,6 +4,7 @@
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 
 struct object_lock {
   pthread_mutex_t lock;
@@ -11,6 +12,8 @@ struct object_lock {
   int sharing; /* threads; the first takes the lock of the database, the last gives it back */
   int shared;  /* it was taken for them */
   int64_t number;
+  char name[33]; /* of its announcements */
+  int announced;
 };
 
 static _Thread_local int64_t number_of_thread;
@@ -20,6 +23,9 @@ object_lock *object_lock_open(const char *url) {
   if (!l) {
     return NULL;
   }
+  unsigned char random[16];
+  randombytes_buf(random, sizeof random);
+  sodium_bin2hex(l->name, sizeof l->name, random, sizeof random);
   pthread_mutex_init(&l->lock, NULL);
   if (database_open(url, SQL_READS, &l->db) != SQL_OK) {
     object_lock_close(l);
@@ -46,12 +52,32 @@ static void let_all_go(object_lock *l) {
 }
 
 /* A connection that was made again has no locks. */
-int object_lock_holds(object_lock *l) {
+static int holds_any(object_lock *l) {
   sql_statement *st = database_statement(
       &l->db, "SELECT count(*) FROM pg_locks WHERE locktype='advisory' AND pid=pg_backend_pid() AND granted");
   int holds = st && sql_step(st) == SQL_ROW && sql_integer(st, 0) > 0;
   sql_reset(st);
   return holds;
+}
+
+/* Waits for what nodes announced that have lost the lock since. 0: the database is away. */
+static int wait_for_deletions(object_lock *l) {
+  enum { LOOK_MS = 500 };
+  for (int64_t left = 1; left > 0;) {
+    sql_statement *st =
+        database_statement(&l->db, "SELECT coalesce(max(until)-clock_ms(), 0) FROM deletion WHERE until>=clock_ms()");
+    if (!st || sql_step(st) != SQL_ROW) {
+      sql_reset(st);
+      return 0;
+    }
+    left = sql_integer(st, 0);
+    sql_reset(st);
+    if (left > 0) {
+      const int64_t ms = left < LOOK_MS ? left : LOOK_MS;
+      nanosleep(&(struct timespec){0, (long)ms * 1000000}, NULL);
+    }
+  }
+  return 1;
 }
 
 /* Every sharing that begins has another number, also one that did not get the lock: nobody holds that number. */
@@ -63,7 +89,7 @@ static int begin_sharing(object_lock *l) {
   snprintf(sql, sizeof sql,
            "SELECT pg_advisory_lock_shared(%d, hashtext(current_schema())); SELECT pg_advisory_lock(%lld)",
            SQL_LOCK_OBJECTS, (long long)l->number);
-  int taken = run(l, sql);
+  int taken = run(l, sql) && wait_for_deletions(l);
   if (!taken) {
     let_all_go(l);
   }
@@ -72,7 +98,7 @@ static int begin_sharing(object_lock *l) {
 
 int object_lock_share(object_lock *l) {
   pthread_mutex_lock(&l->lock);
-  l->shared = l->sharing++ > 0 && l->shared && object_lock_holds(l);
+  l->shared = l->sharing++ > 0 && l->shared && holds_any(l);
   l->shared = l->shared || begin_sharing(l);
   number_of_thread = l->number;
   int shared = l->shared;
@@ -123,6 +149,41 @@ int object_lock_exclude(object_lock *l) {
   return taken;
 }
 
+/* The connection only reads otherwise. */
+static int change(object_lock *l, const char *sql) {
+  char text[512];
+  snprintf(text, sizeof text, "BEGIN READ WRITE; %s; COMMIT", sql);
+  int done = run(l, text);
+  if (!done) {
+    run(l, "ROLLBACK");
+  }
+  return done;
+}
+
+/* The look comes after the commit: a lock that is held now was held then, so whoever takes it later finds the row. */
+int object_lock_announce(object_lock *l) {
+  char sql[384];
+  snprintf(sql, sizeof sql,
+           "DELETE FROM deletion WHERE until<clock_ms(); INSERT INTO deletion(node, until) VALUES('%s', clock_ms()+%d)"
+           " ON CONFLICT(node) DO UPDATE SET until=excluded.until",
+           l->name, (int)OBJECT_LOCK_DELETES_MS);
+  if (!change(l, sql)) {
+    return 0;
+  }
+  l->announced = 1;
+  return holds_any(l);
+}
+
+void object_lock_keep_announced(object_lock *l) {
+  l->announced = 0;
+}
+
 void object_lock_let_go(object_lock *l) {
+  char sql[96];
+  if (l->announced) {
+    snprintf(sql, sizeof sql, "DELETE FROM deletion WHERE node='%s'", l->name);
+    change(l, sql);
+    l->announced = 0;
+  }
   let_all_go(l);
 }

@@ -4,7 +4,12 @@
  * The database drops the lock with its connection, and others may then delete what was published meanwhile. So who
  * shares the lock also holds a number, a lock of the same connection that nobody else takes, and a transaction that
  * names objects commits only while that number is held (object_lock_check()). Who excludes others waits for the
- * transaction that runs, because it may have looked before the lock was lost. */
+ * transaction that runs, because it may have looked before the lock was lost.
+ *
+ * A node that deletes may lose the lock, too, between its last look and the moment at which S3 carries out its request.
+ * So it announces each deletion in the catalogue for OBJECT_LOCK_DELETES_MS, by the database's clock, and signs the
+ * request before, so that S3 refuses it long before that time is over (bucket_delete()). Who shares the lock while an
+ * announcement stands waits until it is withdrawn or over. */
 #ifndef ORB_STORE_OBJECT_LOCK_H
 #define ORB_STORE_OBJECT_LOCK_H
 
@@ -27,7 +32,10 @@ int object_lock_check(database *db, int64_t number);
 /* 0: not taken, because others hold it for long, or the database is away. */
 int object_lock_exclude(object_lock *l);
 void object_lock_let_go(object_lock *l);
-/* Whether what was taken is still held: not, if the connection was lost meanwhile. */
-int object_lock_holds(object_lock *l);
+/* Of who excludes others: announces a deletion. 0: the lock was lost, nothing may be deleted. object_lock_let_go()
+ * withdraws the announcement, unless object_lock_keep_announced() says that S3 has not answered the request. */
+enum { OBJECT_LOCK_DELETES_MS = 15000 }; /* three times BUCKET_DELETE_S: the clocks of S3's machines may differ */
+int object_lock_announce(object_lock *l);
+void object_lock_keep_announced(object_lock *l);
 
 #endif

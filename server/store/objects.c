@@ -194,15 +194,13 @@ void objects_let_go(objects *store) {
   }
   if (store->excludes) { /* only of a thread that has the lock alone; others must not write it */
     store->excludes = 0;
+    store->excluded = 0;
   }
   pthread_rwlock_unlock(&store->publishing);
 }
 void objects_hold_again(objects *store) {
   objects_let_go(store);
   objects_hold(store);
-}
-int objects_still_excludes(objects *store) {
-  return store->excluded && (!store->nodes || object_lock_holds(store->nodes));
 }
 
 store_result objects_begin(objects *store, object_temp *temp) {
@@ -365,11 +363,27 @@ static void end_deleting(const objects *store) {
   }
 }
 
-static store_result unlink_object(const objects *store, object_kind kind, const char *id) {
+/* Before a request that deletes from the bucket, which is signed as of *at: others are excluded still, and S3 refuses
+ * the request long before they go on without this node. */
+static int announce(objects *store, int64_t *at) {
+  *at = store->nodes ? vault_clock(store->vault) : 0;
+  return store->excluded && (!store->nodes || object_lock_announce(store->nodes));
+}
+
+/* A request without an answer may still be on its way. */
+static store_result answered(objects *store, store_result result) {
+  if (store->nodes && result == STORE_AWAY) {
+    object_lock_keep_announced(store->nodes);
+  }
+  return result;
+}
+
+static store_result unlink_object(objects *store, object_kind kind, const char *id) {
   if (store->vault) {
     char name[OBJECT_NAME];
+    int64_t at;
     objects_name(kind, id, name);
-    return vault_delete(store->vault, name);
+    return announce(store, &at) ? answered(store, vault_delete(store->vault, name, at)) : STORE_AWAY;
   }
   return object_file_delete(store->root, kind, id);
 }
@@ -382,7 +396,7 @@ store_result objects_delete(objects *store, object_kind kind, const char *id) {
     result = unlink_object(store, kind, id);
     end_deleting(store);
   }
-  if (!deletes || result == STORE_AWAY) {
+  if (!deletes || result == STORE_AWAY || result == STORE_CONFLICT) {
     result = STORE_OK;
     held_object *one = calloc(1, sizeof *one); /* without memory the file stays until --gc */
     if (one) {
@@ -418,8 +432,13 @@ static void heal_damaged(objects *store) {
   while (store->vault && vault_take_damaged(store->vault, name)) {
     object_kind kind;
     const char *id;
+    int64_t at;
     metrics_quarantined();
-    if (objects_read_name(name, &kind, &id) && store->heal) {
+    store_result dropped = objects_exclude(store) && announce(store, &at)
+                               ? answered(store, vault_drop_damaged(store->vault, name, at))
+                               : STORE_AWAY;
+    objects_let_go(store);
+    if (dropped == STORE_NOT_FOUND && objects_read_name(name, &kind, &id) && store->heal) {
       store->heal(store->heal_user, kind, id);
     }
   }
@@ -485,7 +504,11 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
   if (result == STORE_OK && store->vault) {
     char name[OBJECT_NAME];
     objects_name(kind, id, name);
-    result = vault_quarantine(store->vault, name, fd, aside);
+    int64_t at;
+    result = objects_exclude(store) && announce(store, &at)
+                 ? answered(store, vault_quarantine(store->vault, name, fd, aside, at))
+                 : STORE_AWAY;
+    objects_let_go(store);
     moved = result == STORE_NOT_FOUND;
   } else if (result == STORE_OK) {
     (void)objects_exclude(store); /* files: there are no other nodes */
@@ -512,7 +535,8 @@ store_result objects_set_aside(objects *store, object_kind kind, const char *id)
   if (result == STORE_OK && store->vault) {
     char name[OBJECT_NAME];
     objects_name(kind, id, name);
-    result = vault_set_aside(store->vault, name, aside);
+    int64_t at;
+    result = announce(store, &at) ? answered(store, vault_set_aside(store->vault, name, aside, at)) : STORE_AWAY;
   } else if (result == STORE_OK) {
     result = object_file_set_aside(store->root, kind, id, aside);
   }

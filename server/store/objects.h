@@ -65,8 +65,6 @@ void objects_hold_again(objects *store);
 /* 0: nodes that share the bucket could not be excluded; nothing may be deleted. */
 int objects_exclude(objects *store);
 void objects_let_go(objects *store);
-/* Whether the caller of objects_exclude() still excludes other nodes; asked before an object is deleted. */
-int objects_still_excludes(objects *store);
 /* The bucket is shared with other nodes; the store closes the lock. */
 struct object_lock;
 void objects_share(objects *store, struct object_lock *lock);
@@ -95,7 +93,8 @@ void objects_path(const objects *store, object_kind kind, const char *id, char o
 /* Makes the folder of that file, if it is not there. */
 store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
-/* Deletes an object that no row names. While a backup runs, or S3 is away, it stays until objects_delete_held(). */
+/* Deletes an object that no row names; called while others are excluded. While a backup runs, S3 is away, or others are
+ * excluded no more, it stays until objects_delete_held(). */
 store_result objects_delete(objects *store, object_kind kind, const char *id);
 /* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named:
  * whether a row names the object again; called while other threads are excluded. After a restart of the process the
@@ -109,7 +108,7 @@ int objects_backup_runs(objects *store);
 int objects_hold_backups(objects *store);
 
 /* For --gc: an object without a row may be all that is left of a row that the catalogue lost, so it goes to the folder
- * lost+found first, and is deleted after a while. */
+ * lost+found first, and is deleted after a while. Called while others are excluded. */
 store_result objects_set_aside(objects *store, object_kind kind, const char *id);
 /* Deletes what was set aside before a Unix time in seconds. Returns the number of files. */
 long objects_purge_lost(objects *store, int64_t before);

@@ -178,15 +178,19 @@ int sql_postgresql_is_away(void) {
   return __atomic_load_n(&away, __ATOMIC_RELAXED);
 }
 
-static int64_t failed_at; /* when it last did not answer, as now_ms(); __atomic */
+static int64_t failed_at; /* when it last did not answer, or a connection was found lost, as now_ms(); __atomic */
 
 int64_t sql_postgresql_failed_at(void) {
   return __atomic_load_n(&failed_at, __ATOMIC_RELAXED);
 }
 
+static void note_failure(void) {
+  __atomic_store_n(&failed_at, now_ms(), __ATOMIC_RELAXED);
+}
+
 void sql_postgresql_note(int is_away) {
   if (is_away) {
-    __atomic_store_n(&failed_at, now_ms(), __ATOMIC_RELAXED);
+    note_failure();
   }
   __atomic_store_n(&away, is_away, __ATOMIC_RELAXED);
 }
@@ -201,6 +205,7 @@ static int restore(connection *c) {
     return SQL_OK;
   }
   const int known = sql_postgresql_is_away();
+  note_failure();
   if (is_too_soon()) {
     return refuse(c, SQL_IOERR, "the database does not answer");
   }

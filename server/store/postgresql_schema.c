@@ -217,5 +217,9 @@ const char *const postgresql_migrations[] = {
     "CREATE INDEX job_computes ON job(owner, priority DESC, seq) WHERE state=0 AND waits=0 AND kind<>2;"
     "CREATE INDEX job_fetches ON job(owner, priority DESC, seq) WHERE state=0 AND waits=0 AND kind=2;"
     "CREATE INDEX job_suspects ON job(seq) WHERE state=0 AND waits=0 AND suspect=1;",
+    /* Until when a node may delete objects (object_lock.h). And an owner's smallest jobs, for nodes that lack memory.
+     */
+    "CREATE TABLE deletion(node ident PRIMARY KEY, until BIGINT NOT NULL);"
+    "CREATE INDEX job_small ON job(owner, cost) WHERE state=0 AND waits=0 AND kind<>2;",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];

@@ -11,6 +11,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "orbmorph/context.h"
+
 enum {
   CONNECT_MS = 5000,
   SLOW_BYTES = 1024, /* a second, over SLOW_SECONDS: a store that is slower than that hangs */
@@ -26,6 +28,7 @@ struct s3 {
   pthread_mutex_t lock;
   CURL *idle[IDLE_MOST]; /* handles, whose connections stay open */
   int idles;
+  int64_t date, date_ms; /* of S3's last answer, a Unix time; when it came, by orb_clock_ms(). 0: none came */
 };
 
 /* One try. */
@@ -36,6 +39,7 @@ typedef struct transfer {
   uint64_t sent, taken;
   size_t room; /* of out->text */
   int no_space;
+  char date[64]; /* of the answer */
 } transfer;
 
 s3 *s3_open(const s3_options *options) {
@@ -196,12 +200,31 @@ static int read_header(const char *line, size_t size, const char *name, char *ou
 }
 
 static size_t take_header(char *line, size_t one, size_t size, void *user) {
-  s3_answer *out = ((transfer *)user)->out;
+  transfer *t = user;
+  s3_answer *out = t->out;
   size *= one;
-  if (!read_header(line, size, "ETag", out->tag, sizeof out->tag)) {
+  if (!read_header(line, size, "ETag", out->tag, sizeof out->tag) &&
+      !read_header(line, size, "Date", t->date, sizeof t->date)) {
     read_header(line, size, "x-amz-meta-sha256", out->meta, sizeof out->meta);
   }
   return size;
+}
+
+static void note_date(s3 *store, const char *text) {
+  int64_t date = *text ? (int64_t)curl_getdate(text, NULL) : -1;
+  if (date > 0) {
+    pthread_mutex_lock(&store->lock);
+    store->date = date;
+    store->date_ms = orb_clock_ms();
+    pthread_mutex_unlock(&store->lock);
+  }
+}
+
+int64_t s3_clock(s3 *store) {
+  pthread_mutex_lock(&store->lock);
+  int64_t now = store->date ? store->date + (orb_clock_ms() - store->date_ms) / 1000 : (int64_t)time(NULL);
+  pthread_mutex_unlock(&store->lock);
+  return now;
 }
 
 static int append(struct curl_slist **list, const char *line) {
@@ -212,6 +235,9 @@ static int append(struct curl_slist **list, const char *line) {
 
 /* The headers, with the signature over all that S3 looks at. */
 static int sign(s3 *store, const s3_request *r, const char *path, struct curl_slist **out) {
+  if (r->signed_at) { /* the URL is signed */
+    return append(out, "expect:");
+  }
   static const char empty[] = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
   const s3_options *o = &store->options;
   const char *sha = r->sha ? r->sha : empty;
@@ -308,6 +334,7 @@ static void perform(s3 *store, transfer *t, const char *path, const char *url) {
     curl_easy_getinfo(t->curl, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
     curl_easy_getinfo(t->curl, CURLINFO_FILETIME_T, &modified);
     out->modified = (int64_t)modified;
+    note_date(store, t->date);
     out->size = length >= 0 ? (uint64_t)length : t->taken;
     out->status = code == CURLE_OK ? (int)status : 0;
     if (t->no_space) {
@@ -339,15 +366,41 @@ void s3_pause(int tried) {
   nanosleep(&time, NULL);
 }
 
+/* A URL that carries its signature. */
+static int link_to(s3 *store, const char *method, const char *path, int64_t at, long seconds, const char *more,
+                   char *out, size_t size) {
+  const s3_place *p = &store->options.place;
+  s3_keys keys = keys_of(store);
+  char date[S3_DATE];
+  s3_date((long long)at, date);
+  const s3_presigned url = {.method = method,
+                            .region = p->region,
+                            .host = p->host,
+                            .path = path,
+                            .date = date,
+                            .seconds = seconds,
+                            .more = more};
+  int n = snprintf(out, size, "%s://%s%s?", p->scheme, p->host, path);
+  int fits = n > 0 && (size_t)n < size && s3_presign(&keys, &url, out + n, size - (size_t)n);
+  sodium_memzero(&keys, sizeof keys);
+  return fits;
+}
+
 void s3_send(s3 *store, const s3_request *request, s3_answer *out) {
   const s3_place *p = &store->options.place;
-  char path[1024], url[4096];
+  char path[1024], url[S3_TOKEN + 4096];
   snprintf(path, sizeof path, "%s%s%s", p->base, request->key ? p->prefix : "", request->key ? request->key : "");
   if (!request->key && path[1]) {
     path[strlen(path) - 1] = 0; /* "/BUCKET" */
   }
   snprintf(url, sizeof url, "%s://%s%s%s%s", p->scheme, p->host, path, request->query ? "?" : "",
            request->query ? request->query : "");
+  if (request->signed_at && !link_to(store, request->method, path, request->signed_at, request->seconds,
+                                     request->query ? request->query : "", url, sizeof url)) {
+    memset(out, 0, sizeof *out);
+    snprintf(out->why, sizeof out->why, "its URL is too long");
+    return;
+  }
   for (int tried = 0;; tried++) {
     memset(out, 0, sizeof *out);
     transfer t = {.request = request, .out = out};
@@ -365,14 +418,9 @@ void s3_send(s3 *store, const s3_request *request, s3_answer *out) {
 }
 
 int s3_link(s3 *store, const char *key, long seconds, const char *more, char *out, size_t size) {
-  const s3_options *o = &store->options;
-  s3_keys keys = keys_of(store);
-  char path[1024], date[S3_DATE];
-  snprintf(path, sizeof path, "%s%s%s", o->place.base, o->place.prefix, key);
-  int n = snprintf(out, size, "%s://%s%s?", o->place.scheme, o->place.host, path);
-  s3_date((long long)time(NULL), date);
-  return n > 0 && (size_t)n < size &&
-         s3_presign(&keys, o->place.region, o->place.host, path, date, seconds, more, out + n, size - (size_t)n);
+  char path[1024];
+  snprintf(path, sizeof path, "%s%s%s", store->options.place.base, store->options.place.prefix, key);
+  return link_to(store, "GET", path, (int64_t)time(NULL), seconds, more, out, size);
 }
 
 static size_t decode_entity(const char *text, char *out) {

@@ -28,6 +28,10 @@ typedef struct s3_request {
   const char *meta; /* kept beside the object as x-amz-meta-sha256; NULL: nothing */
   int to;           /* a file that takes the body of an answer 2xx from its start; −1: `text` takes it */
   int tries;        /* at most; ≥ 1 */
+  /* Not 0: it is signed as of this time of s3_clock(), and S3 refuses it after so many seconds, however late it comes.
+   */
+  int64_t signed_at;
+  long seconds;
 } s3_request;
 
 typedef struct s3_answer {
@@ -48,6 +52,9 @@ void s3_use_keys(s3 *store, const s3_keys *keys);
 /* Sends a request, again after 5xx, 429, a lost connection or half an answer, after pauses that grow and are drawn at
  * random. The caller frees out->text. */
 void s3_send(s3 *store, const s3_request *request, s3_answer *out);
+/* What time it is for S3, a Unix time, as far as its last answer says: never ahead of S3, but behind it by the time
+ * that an answer took, and by what this process did not run. */
+int64_t s3_clock(s3 *store);
 /* The pause after so many tries before, from 0. */
 void s3_pause(int tried);
 /* A URL that lets anyone GET an object for so many seconds. more: see s3_presign(). 0: it does not fit. */

@@ -75,24 +75,24 @@ int s3_encode(const char *text, char *out, size_t size) {
   return 1;
 }
 
-int s3_presign(const s3_keys *keys, const char *region, const char *host, const char *path, const char date[S3_DATE],
-               long seconds, const char *more, char *out, size_t size) {
+int s3_presign(const s3_keys *keys, const s3_presigned *u, char *out, size_t size) {
   char credential[2 * S3_KEY], encoded[3 * sizeof credential], token[2 * S3_TOKEN], headers[512];
   char signature[S3_SIGNATURE];
-  snprintf(credential, sizeof credential, "%s/%.8s/%s/s3/aws4_request", keys->access, date, region);
-  snprintf(headers, sizeof headers, "host:%s\n", host);
+  snprintf(credential, sizeof credential, "%s/%.8s/%s/s3/aws4_request", keys->access, u->date, u->region);
+  snprintf(headers, sizeof headers, "host:%s\n", u->host);
   if (!s3_encode(credential, encoded, sizeof encoded) || !s3_encode(keys->token, token, sizeof token)) {
     return 0;
   }
   int n = snprintf(out, size,
                    "X-Amz-Algorithm=AWS4-HMAC-SHA256&X-Amz-Credential=%s&X-Amz-Date=%s&X-Amz-Expires=%ld%s%s"
                    "&X-Amz-SignedHeaders=host%s%s",
-                   encoded, date, seconds, *token ? "&X-Amz-Security-Token=" : "", token, *more ? "&" : "", more);
+                   encoded, u->date, u->seconds, *token ? "&X-Amz-Security-Token=" : "", token, *u->more ? "&" : "",
+                   u->more);
   if (n < 0 || (size_t)n >= size) {
     return 0;
   }
-  const s3_canonical request = {"GET", path, out, headers, "host", "UNSIGNED-PAYLOAD"};
-  s3_sign(keys, region, "s3", date, &request, signature);
+  const s3_canonical request = {u->method, u->path, out, headers, "host", "UNSIGNED-PAYLOAD"};
+  s3_sign(keys, u->region, "s3", u->date, &request, signature);
   int m = snprintf(out + n, size - (size_t)n, "&X-Amz-Signature=%s", signature);
   return m > 0 && (size_t)(n + m) < size;
 }

@@ -31,9 +31,15 @@ void s3_sign(const s3_keys *keys, const char *region, const char *service, const
              const s3_canonical *request, char out[S3_SIGNATURE]);
 /* Encodes a value for a query. 0: it does not fit. */
 int s3_encode(const char *text, char *out, size_t size);
-/* The query, without its question mark, of a URL that lets anyone GET the path for so many seconds. 0: it does not fit.
- * more: parameters to be sent and signed, sorted and encoded, all after X-Amz-…; "": none. */
-int s3_presign(const s3_keys *keys, const char *region, const char *host, const char *path, const char date[S3_DATE],
-               long seconds, const char *more, char *out, size_t size);
+
+/* A URL that carries its signature, and is valid for so many seconds from a date. */
+typedef struct s3_presigned {
+  const char *method, *region, *host, *path;
+  const char *date; /* of s3_date() */
+  long seconds;
+  const char *more; /* parameters to be sent and signed, sorted and encoded, all after X-Amz-…; "": none */
+} s3_presigned;
+/* Its query, without the question mark. 0: it does not fit. */
+int s3_presign(const s3_keys *keys, const s3_presigned *url, char *out, size_t size);
 
 #endif

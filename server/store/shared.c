@@ -10,10 +10,18 @@
 
 /* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner. Owners with ready jobs, each
  * with the first one that fits, in the order of fairness (queue/queue.h). While a suspect waits, one node keeps its
- * workers. Of an owner it looks at his first LOOK_AT jobs only: a claim that finds none must not read a million. Which
- * kind is text, so that each has an index of its own. */
+ * workers. Of an owner it looks at his first LOOK_AT jobs only, and where none of them fits, at his LOOK_AT smallest: a
+ * claim that finds none must not read a million. Which kind is text, so that each has an index of its own. */
 #define LOOK_AT "64"
-#define PICK(of_kind) \
+#define FITS(of_kind, order)                                                                                  \
+  "(SELECT j.id, j.priority, j.seq, j.suspect FROM"                                                           \
+  "  (SELECT id, key, priority, seq, suspect, cost, big FROM job WHERE owner=t.owner AND state=0 AND waits=0" \
+  "   AND " of_kind " ORDER BY " order " LIMIT " LOOK_AT                                                      \
+  ") AS j"                                                                                                    \
+  "  WHERE j.cost<=?3 AND j.big<=?4 AND j.suspect<=?5"                                                        \
+  "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"                                     \
+  "  ORDER BY j.priority DESC, j.seq LIMIT 1)"
+#define PICK(next) \
   "WITH live AS (SELECT name, workers FROM node WHERE until>=clock_ms() AND workers>0),"                              \
   " busy AS (SELECT owner, count(*) FILTER (WHERE kind<>2) AS computing, count(*) FILTER (WHERE kind=2) AS fetching," \
   "  coalesce(sum(greatest(0, clock_ms()-claimed-" ESTIMATE("job") ")) FILTER (WHERE kind<>2), 0) AS beyond"          \
@@ -21,12 +29,7 @@
   " share AS (SELECT ceil((SELECT sum(workers) FROM live)::float/greatest(1, (SELECT count(*) FROM"                   \
   "  (SELECT owner FROM turn WHERE ready>0 UNION SELECT owner FROM busy WHERE computing>0) AS active))) AS workers)"  \
   " SELECT next.id FROM turn t LEFT JOIN busy b ON b.owner=t.owner CROSS JOIN share s CROSS JOIN LATERAL"             \
-  " (SELECT j.id, j.priority, j.seq, j.suspect FROM"                                                                  \
-  "  (SELECT id, key, priority, seq, suspect, cost, big FROM job WHERE owner=t.owner AND state=0 AND waits=0 AND "    \
-  of_kind "   ORDER BY priority DESC, seq LIMIT " LOOK_AT ") AS j"                                                    \
-  "  WHERE j.cost<=?3 AND j.big<=?4 AND j.suspect<=?5"                                                                \
-  "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"                                             \
-  "  ORDER BY j.priority DESC, j.seq LIMIT 1) AS next"                                                                \
+  " (" next ") AS next"                                                                                               \
   " WHERE t.ready>0 AND (?6=0 OR (coalesce(b.computing, 0)=0"                                                         \
   "   AND (SELECT sum(computing) FROM busy)>=(SELECT sum(workers) FROM live)))"                                       \
   "  AND (?2=0 OR coalesce(b.fetching, 0)<?7)"                                                                        \
@@ -34,7 +37,10 @@
   "   OR NOT EXISTS(SELECT 1 FROM job k WHERE k.state=0 AND k.waits=0 AND k.suspect=1))"                              \
   " ORDER BY next.suspect DESC, next.priority/8 DESC, (coalesce(b.computing, 0)>=s.workers),"                         \
   "  t.service+coalesce(b.beyond, 0), next.seq LIMIT 1"
-static const char pick_computing[] = PICK("kind<>2"), pick_fetching[] = PICK("kind=2");
+/* Append runs its second part only if the first has no row. */
+#define FITS_OR_SMALL(of_kind) FITS(of_kind, "priority DESC, seq") " UNION ALL " FITS(of_kind, "cost") " LIMIT 1"
+static const char pick_computing[] = PICK(FITS_OR_SMALL("kind<>2"));
+static const char pick_fetching[] = PICK(FITS("kind=2", "priority DESC, seq"));
 
 /* Another claim of the same moment skips the row, where the lock of transactions did not keep it waiting. */
 static const char take[] =

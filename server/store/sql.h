@@ -82,7 +82,8 @@ extern const sql_driver sql_postgresql;
 /* Whether the server did not answer when it was last tried. The second notes that. */
 int sql_postgresql_is_away(void);
 void sql_postgresql_note(int is_away);
-int64_t sql_postgresql_failed_at(void); /* when that was last so, in ms of the monotonic clock; 0: never */
+/* When that was last so, or a connection was found to be lost, in ms of the monotonic clock; 0: never. */
+int64_t sql_postgresql_failed_at(void);
 
 static inline void sql_bind_text(sql_statement *st, int parameter, const char *text) {
   st->driver->bind_text(st, parameter, text);

@@ -126,23 +126,35 @@ static void name_aside(const vault *v, const char *name, char out[PATH_MAX]) {
   snprintf(out, PATH_MAX, "%s/quarantine/%s-%lld", v->root, flat, (long long)time(NULL));
 }
 
-/* Keeps wrong bytes, and notes their name. They are deleted from the bucket: it holds no other copy unless it has
- * versions. */
-static void set_damaged(vault *v, const char *name, const char *from) {
-  char aside[PATH_MAX];
-  name_aside(v, name, aside);
-  if (rename(from, aside) != 0 || bucket_delete(v->bucket, name) != STORE_OK) {
-    log_error("the damaged object %s could not be moved to %s", name, aside);
-    return;
+/* 0: it is noted already, or there is no memory. */
+static int note_damaged(vault *v, const char *name) {
+  int known = 0;
+  pthread_mutex_lock(&v->lock);
+  for (const damaged *one = v->damaged; one && !known; one = one->next) {
+    known = strcmp(one->name, name) == 0;
   }
-  log_error("an object in S3 does not match its hash and was moved to %s", aside);
-  damaged *one = calloc(1, sizeof *one);
+  damaged *one = known ? NULL : calloc(1, sizeof *one);
   if (one) {
     snprintf(one->name, sizeof one->name, "%s", name);
-    pthread_mutex_lock(&v->lock);
     one->next = v->damaged;
     v->damaged = one;
-    pthread_mutex_unlock(&v->lock);
+  }
+  pthread_mutex_unlock(&v->lock);
+  return one != NULL;
+}
+
+/* Keeps wrong bytes, and notes their name. Who takes it deletes them from the bucket: this thread may be one that
+ * publishes, and cannot exclude others. */
+static void set_damaged(vault *v, const char *name, const char *from) {
+  char aside[PATH_MAX];
+  if (!note_damaged(v, name)) {
+    return; /* its bytes have been kept */
+  }
+  name_aside(v, name, aside);
+  if (rename(from, aside) == 0) {
+    log_error("an object in S3 does not match its hash and was moved to %s", aside);
+  } else {
+    log_error("the damaged object %s could not be moved to %s", name, aside);
   }
 }
 
@@ -190,16 +202,39 @@ store_result vault_read(vault *v, const char *name, int *fd, uint64_t *size) {
   return result;
 }
 
+store_result vault_drop_damaged(vault *v, const char *name, int64_t signed_at) {
+  char temp[PATH_MAX];
+  uint64_t size;
+  snprintf(temp, sizeof temp, "%s/tmp/get-XXXXXX", v->root);
+  int file = mkostemp(temp, O_CLOEXEC);
+  if (file < 0) {
+    log_error("create %s: %s", temp, strerror(errno));
+    return STORE_ERROR;
+  }
+  store_result result = bucket_get(v->bucket, name, file, &size);
+  close(file);
+  unlink(temp);
+  if (result == STORE_CONFLICT) { /* it is as damaged as before */
+    result = bucket_delete(v->bucket, name, signed_at);
+    return result == STORE_OK ? STORE_NOT_FOUND : result;
+  }
+  return result;
+}
+
 store_result vault_look(vault *v, const char *name) {
   return bucket_look(v->bucket, name, NULL, NULL);
 }
 
-store_result vault_delete(vault *v, const char *name) {
+int64_t vault_clock(vault *v) {
+  return bucket_clock(v->bucket);
+}
+
+store_result vault_delete(vault *v, const char *name, int64_t signed_at) {
   char path[PATH_MAX];
   path_of(v, name, path);
   unlink(path);
   FAULT_POINT("before-unlink");
-  return bucket_delete(v->bucket, name);
+  return bucket_delete(v->bucket, name, signed_at);
 }
 
 store_result vault_each(vault *v, void (*each)(void *user, const char *name, uint64_t size), void *user) {
@@ -215,7 +250,7 @@ uint64_t vault_copy(const vault *v, const char *name) {
                                 : 0;
 }
 
-store_result vault_quarantine(vault *v, const char *name, int fd, const char *aside) {
+store_result vault_quarantine(vault *v, const char *name, int fd, const char *aside, int64_t signed_at) {
   char path[PATH_MAX], here[65], there[65] = "";
   struct stat read, named;
   path_of(v, name, path);
@@ -227,13 +262,13 @@ store_result vault_quarantine(vault *v, const char *name, int fd, const char *as
   }
   store_result result = bucket_look(v->bucket, name, there, NULL);
   if (result == STORE_OK && strcmp(here, there) == 0) {
-    result = bucket_delete(v->bucket, name);
+    result = bucket_delete(v->bucket, name, signed_at);
     return result == STORE_OK ? STORE_NOT_FOUND : result;
   }
   return result;
 }
 
-store_result vault_set_aside(vault *v, const char *name, const char *aside) {
+store_result vault_set_aside(vault *v, const char *name, const char *aside, int64_t signed_at) {
   char path[PATH_MAX];
   int fd;
   uint64_t size;
@@ -252,7 +287,7 @@ store_result vault_set_aside(vault *v, const char *name, const char *aside) {
     log_error("rename to %s: %s", aside, strerror(errno));
     return STORE_ERROR;
   }
-  return bucket_delete(v->bucket, name);
+  return bucket_delete(v->bucket, name, signed_at);
 }
 
 int vault_is_away(vault *v) {

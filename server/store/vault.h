@@ -22,7 +22,9 @@ store_result vault_publish(vault *v, const char *name, int fd, const char *path)
 store_result vault_read(vault *v, const char *name, int *fd, uint64_t *size);
 /* Asks the bucket, not the cache. */
 store_result vault_look(vault *v, const char *name);
-store_result vault_delete(vault *v, const char *name);
+/* See bucket_delete(). */
+store_result vault_delete(vault *v, const char *name, int64_t signed_at);
+int64_t vault_clock(vault *v);
 /* Calls `each` for every object of the bucket. */
 store_result vault_each(vault *v, void (*each)(void *user, const char *name, uint64_t size), void *user);
 
@@ -30,12 +32,14 @@ store_result vault_each(vault *v, void (*each)(void *user, const char *name, uin
 uint64_t vault_copy(const vault *v, const char *name);
 /* For a copy that was read through fd and is not what its row says: moves it aside. STORE_NOT_FOUND: the object in the
  * bucket was the same, and is deleted; STORE_OK: the bucket has another one. */
-store_result vault_quarantine(vault *v, const char *name, int fd, const char *aside);
+store_result vault_quarantine(vault *v, const char *name, int fd, const char *aside, int64_t signed_at);
 /* Moves an object out of the bucket to a path, for --gc. STORE_CONFLICT: it is younger than VAULT_GRACE_S, so its row
  * may still come. */
-store_result vault_set_aside(vault *v, const char *name, const char *aside);
+store_result vault_set_aside(vault *v, const char *name, const char *aside, int64_t signed_at);
 /* Takes the name of one object that vault_read() found damaged. 0: there is none. */
 int vault_take_damaged(vault *v, char name[VAULT_NAME]);
+/* Deletes it from the bucket if it is still damaged. STORE_NOT_FOUND: done; STORE_OK: it has been replaced. */
+store_result vault_drop_damaged(vault *v, const char *name, int64_t signed_at);
 
 int vault_is_away(vault *v);
 int vault_link(vault *v, const char *name, long seconds, const char *more, char out[BUCKET_LINK]);

@@ -172,6 +172,11 @@ static const char *why_failed(orb_context *ctx, const api_problem *problem) {
   return problem->name ? problem->name : status != ORB_OK ? orb_status_name(status) : "given back";
 }
 
+/* Whether a job that ran since `began` may have failed because a store was away. */
+static int may_be_store(const run_env *env, int64_t began) {
+  return objects_are_away(env->store) || catalogue_was_away(env->cat, began);
+}
+
 static void fetch_one(worker_pool *pool, job *j, job_spans *spans) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env = pool->env;
@@ -195,6 +200,8 @@ static void fetch_one(worker_pool *pool, job *j, job_spans *spans) {
     queue_put_off(env.q, j);
   } else if (fine) {
     queue_finish_mesh(env.q, j, mesh);
+  } else if (may_be_store(&env, began) && !queue_cancel_wanted(env.q, j)) {
+    queue_give_back(env.q, j);
   } else {
     finish_failed(&env, j, ctx, &problem);
   }
@@ -246,11 +253,6 @@ static void crashed(const run_env *env, job *j, const isolated_end *end) {
 
 static int lacks_memory(orb_context *ctx, const api_problem *problem) {
   return problem->name ? strcmp(problem->name, "no-memory") == 0 : orb_context_error(ctx)->status == ORB_E_NO_MEMORY;
-}
-
-/* Whether a job that ran since `began` may have failed because a store was away. */
-static int may_be_store(const run_env *env, int64_t began) {
-  return objects_are_away(env->store) || catalogue_was_away(env->cat, began);
 }
 
 typedef struct made {

@@ -9,7 +9,7 @@ import test from 'node:test';
 import parsers from '@stoplight/spectral-parsers';
 import { folder } from './support/cli.mjs';
 import { binaries, daemon, root, slow, until } from './support/daemon.mjs';
-import { configuration } from './support/haproxy.mjs';
+import { configuration } from './support/haproxy_config.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const lacks = (program) => spawnSync(program, ['--version']).error !== undefined && `${program} is not installed`;

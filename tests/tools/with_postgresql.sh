@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs a command with a PostgreSQL server of its own, which ends with it: with_postgresql.sh COMMAND…
 #
-# The command finds in its environment
+# ORB_POSTGRESQL_OPTIONS are more options of the server. The command finds in its environment
 #   ORB_POSTGRESQL     the URL of the server's database
 #   ORB_NEW_CATALOGUE  a program: prints the URL of the catalogue for a data folder, and creates its empty schema
 #   ORB_POSTGRESQL_DO  a program: stops or starts the server (stop, start)
@@ -36,7 +36,7 @@ cat >"$ORB_POSTGRESQL_DO" <<END
 #!/bin/sh
 cd "$folder"
 exec ${as[*]} env HOME="$folder" "$bin/pg_ctl" -D "$folder/data" -s -w -m fast -l "$folder/server.log" \
-  -o "-c listen_addresses='' -c unix_socket_directories='$folder' -c fsync=off -c max_connections=300 -c shared_buffers=32MB" "\$1"
+  -o "-c listen_addresses='' -c unix_socket_directories='$folder' -c fsync=off -c max_connections=300 -c shared_buffers=32MB ${ORB_POSTGRESQL_OPTIONS:-}" "\$1"
 END
 chmod 755 "$ORB_POSTGRESQL_DO"
 "$ORB_POSTGRESQL_DO" start || { cat "$folder/server.log" >&2; exit 1; }

@@ -80,15 +80,21 @@ static void test_presigned(void **state) {
   (void)state;
   static const s3_keys keys = {.access = "AKIAIOSFODNN7EXAMPLE", .secret = "wJalrXUtnFEMI/K7MDENG/bPxRfiCYEXAMPLEKEY"};
   char query[2048];
-  assert_true(s3_presign(&keys, "us-east-1", "examplebucket.s3.amazonaws.com", "/test.txt", "20130524T000000Z", 86400,
-                         "", query, sizeof query));
+  const s3_presigned url = {.method = "GET",
+                            .region = "us-east-1",
+                            .host = "examplebucket.s3.amazonaws.com",
+                            .path = "/test.txt",
+                            .date = "20130524T000000Z",
+                            .seconds = 86400,
+                            .more = ""};
+  assert_true(s3_presign(&keys, &url, query, sizeof query));
   assert_string_equal(query,
                       "X-Amz-Algorithm=AWS4-HMAC-SHA256&X-Amz-Credential=AKIAIOSFODNN7EXAMPLE%2F20130524%2Fus-east-1%"
                       "2Fs3%2Faws4_request"
                       "&X-Amz-Date=20130524T000000Z&X-Amz-Expires=86400&X-Amz-SignedHeaders=host"
                       "&X-Amz-Signature=aeeed9bbccd4d02ee5c0109b86d86835f995330da4c265957d157751f604d404");
   char small[100];
-  assert_false(s3_presign(&keys, "us-east-1", "h", "/test.txt", "20130524T000000Z", 1, "", small, sizeof small));
+  assert_false(s3_presign(&keys, &url, small, sizeof small));
   s3_date(1369353600, small);
   assert_string_equal(small, "20130524T000000Z");
 }

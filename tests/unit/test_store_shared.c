@@ -75,8 +75,8 @@ static submit_outcome submit(nodes *n, int node, const char *owner, char key, in
   return s.outcome;
 }
 
-static store_result claim(nodes *n, int node, job_claim *out) {
-  const claim_wish wish = {.node = names[node], .most_cost = INT64_MAX, .big = 1, .alone = 1, .fetches_most = 4};
+static store_result claim_costing(nodes *n, int node, int64_t most, job_claim *out) {
+  const claim_wish wish = {.node = names[node], .most_cost = most, .big = 1, .alone = 1, .fetches_most = 4};
   store_result result = catalogue_claim_next(n->cat[node], &wish, out);
   if (result == STORE_OK) {
     free(out->row.request);
@@ -84,6 +84,10 @@ static store_result claim(nodes *n, int node, job_claim *out) {
     out->row.request = out->row.problem = NULL;
   }
   return result;
+}
+
+static store_result claim(nodes *n, int node, job_claim *out) {
+  return claim_costing(n, node, INT64_MAX, out);
 }
 
 static store_result finish(nodes *n, int node, const job_claim *c, api_job_state state, const char *problem) {
@@ -113,6 +117,34 @@ static void test_order(void **state) {
     assert_int_equal(c.row.state, API_JOB_RUNNING);
   }
   assert_int_equal(claim(n, 0, &c), STORE_NOT_FOUND);
+}
+
+/* A worker that is kept for small jobs finds one behind any number of large ones. */
+static void test_small_behind_large(void **state) {
+  enum { LARGE_JOBS = 90, LARGE_COST = 1000000, SMALL_COST = 10 };
+  nodes *n = *state;
+  job_row row = {.kind = API_JOB_EMBEDDING, .listed = 1, .created = 1, .owner = "ann"};
+  char small[2][API_JOB_ID_SIZE];
+  job_claim c;
+  row.request = (char *)(uintptr_t) "{}";
+  for (int i = 0; i < LARGE_JOBS + 2; i++) {
+    row.cost = i < LARGE_JOBS ? LARGE_COST : SMALL_COST;
+    snprintf(row.key, sizeof row.key, "%064x", (unsigned)i);
+    api_random_id(row.id);
+    job_submission s = {.row = &row, .limit = 100};
+    assert_int_equal(catalogue_job_submit(n->cat[0], &s), STORE_OK);
+    assert_int_equal(s.outcome, SUBMIT_FRESH);
+    if (i >= LARGE_JOBS) {
+      memcpy(small[i - LARGE_JOBS], row.id, sizeof small[0]);
+    }
+  }
+  for (int i = 0; i < 2; i++) {
+    assert_int_equal(claim_costing(n, 1, SMALL_COST, &c), STORE_OK);
+    assert_string_equal(c.row.id, small[i]);
+  }
+  assert_int_equal(claim_costing(n, 1, SMALL_COST, &c), STORE_NOT_FOUND);
+  assert_int_equal(claim(n, 0, &c), STORE_OK);
+  assert_int_equal(c.row.cost, LARGE_COST);
 }
 
 static void test_one_flight(void **state) {
@@ -345,6 +377,13 @@ static void cut_lock(nodes *n) {
                    1);
 }
 
+/* Sets for how many ms the announcement stands. */
+static int set_until(database *db, void *argument) {
+  char sql[80];
+  snprintf(sql, sizeof sql, "UPDATE deletion SET until=clock_ms()+%lld", (long long)*(const int64_t *)argument);
+  return database_execute(db, sql);
+}
+
 static void test_publishing(void **state) {
   nodes *n = *state;
   object_lock *here = object_lock_open(n->url), *there = object_lock_open(n->url);
@@ -362,6 +401,32 @@ static void test_publishing(void **state) {
   assert_true(object_lock_share(here)); /* published again */
   assert_int_equal(put_mesh(n, '2'), STORE_OK);
   object_lock_unshare(here);
+  object_lock_close(here);
+  object_lock_close(there);
+}
+
+/* A node that lost the lock after it had announced a deletion: its request may come to S3 late. Whoever publishes waits
+ * for that, and a node without the lock announces nothing. */
+static void test_announced_deletion(void **state) {
+  enum { LEFT_MS = 400 };
+  nodes *n = *state;
+  object_lock *here = object_lock_open(n->url), *there = object_lock_open(n->url);
+  assert_true(here && there);
+  assert_true(object_lock_exclude(here));
+  assert_true(object_lock_announce(here));
+  object_lock_let_go(here); /* S3 has answered */
+  assert_int_equal(ask_of_lock(n, "SELECT count(*) FROM deletion WHERE ?1<>0", 1), 0);
+  assert_true(object_lock_exclude(here));
+  assert_true(object_lock_announce(here));
+  assert_true(ask_of_lock(n, "SELECT until-clock_ms() FROM deletion WHERE ?1<>0", 1) > OBJECT_LOCK_DELETES_MS / 2);
+  cut_lock(n);
+  assert_false(object_lock_announce(here));
+  assert_int_equal(catalogue_write(n->cat[0], set_until, &(int64_t){LEFT_MS}), STORE_OK); /* to wait less */
+  assert_true(object_lock_share(there));
+  assert_int_equal(ask_of_lock(n, "SELECT count(*) FROM deletion WHERE until>=clock_ms() AND ?1<>0", 1), 0);
+  assert_int_equal(put_mesh(n, '1'), STORE_OK);
+  object_lock_unshare(there);
+  object_lock_let_go(here);
   object_lock_close(here);
   object_lock_close(there);
 }
@@ -445,6 +510,7 @@ static void test_excluding_waits_for_transactions(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_order, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_small_behind_large, setup, teardown),
       cmocka_unit_test_setup_teardown(test_one_flight, setup, teardown),
       cmocka_unit_test_setup_teardown(test_limits, setup, teardown),
       cmocka_unit_test_setup_teardown(test_lease, setup, teardown),
@@ -454,6 +520,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_cancel, setup, teardown),
       cmocka_unit_test_setup_teardown(test_notices, setup, teardown),
       cmocka_unit_test_setup_teardown(test_publishing, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_announced_deletion, setup, teardown),
       cmocka_unit_test_setup_teardown(test_publishing_together, setup, teardown),
       cmocka_unit_test_setup_teardown(test_excluding_waits_for_transactions, setup, teardown),
   };

@@ -1,22 +1,13 @@
 // haproxy with deploy/cluster/haproxy.cfg in front of nodes.
-import { spawn, spawnSync } from 'node:child_process';
-import { readFileSync } from 'node:fs';
+import { spawn } from 'node:child_process';
 import { mkdtemp, rm, writeFile } from 'node:fs/promises';
 import net from 'node:net';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
-import { Daemon, root, until } from './daemon.mjs';
+import { Daemon, until } from './daemon.mjs';
+import { configuration, haproxyProgram } from './haproxy_config.mjs';
 
-const program = ['haproxy', '/usr/sbin/haproxy'].find((one) => !spawnSync(one, ['-v']).error);
-export const lacksHaproxy = program ? false : 'haproxy is not there';
-
-/** The configuration with these nodes, and with another address to bind. */
-export function configuration(urls, bind) {
-  return readFileSync(path.join(root, 'deploy/cluster/haproxy.cfg'), 'utf8')
-    .replace(/^ {4}maxconn 16384$/m, '    maxconn 64') // each takes descriptors, of which a test may have few
-    .replace(/^ {4}bind :8080$/m, `    bind ${bind}`)
-    .replace(/^ {4}server-template .*$/m, urls.map((url, i) => `    server node${i} ${new URL(url).host}`).join('\n'));
-}
+export const lacksHaproxy = haproxyProgram ? false : 'haproxy is not there';
 
 /** Starts haproxy before nodes with these URLs, until the test ends; resolves to what asks it as one asks a daemon. */
 export async function haproxy(t, urls) {
@@ -27,7 +18,9 @@ export async function haproxy(t, urls) {
   const socket = net.createServer();
   await new Promise((done) => socket.listen(0, '127.0.0.1', done));
   const { port } = socket.address();
-  const child = spawn(program, ['-db', '-f', file], { stdio: ['ignore', 'ignore', 'ignore', socket._handle.fd] });
+  const child = spawn(haproxyProgram, ['-db', '-f', file], {
+    stdio: ['ignore', 'ignore', 'ignore', socket._handle.fd],
+  });
   const ended = new Promise((done) => child.once('exit', done));
   socket.close();
   t.after(async () => {

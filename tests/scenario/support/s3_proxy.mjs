@@ -34,17 +34,18 @@ function answer(how, from, body, response) {
 
 /**
  * Starts it before the server at `url`, until the test ends. `decide` chooses by {method, path, query, tries}, where tries
- * counts the requests of this method to this path and query, from 1.
+ * counts the requests of this method to this path and query, from 1. It may return a promise, which holds the request.
  */
 export async function s3Proxy(t, url, decide) {
   const proxy = { decide, seen: [], tries: new Map() };
-  const server = http.createServer((request, response) => {
+  const server = http.createServer(async (request, response) => {
     const [path, query = ''] = request.url.split('?');
     const key = `${request.method} ${request.url}`;
     proxy.tries.set(key, (proxy.tries.get(key) ?? 0) + 1);
     const asked = { method: request.method, path, query, tries: proxy.tries.get(key) };
-    const how = proxy.decide(asked) ?? pass;
+    const how = (await proxy.decide(asked)) ?? pass;
     proxy.seen.push({ ...asked, how });
+    if (response.destroyed) return; // who asked has gone while the request was held
     if (how === busy) {
       request.resume();
       request.on('end', () =>
