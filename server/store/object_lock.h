@@ -1,10 +1,10 @@
 /* The lock of objects over all nodes that share a bucket: an advisory lock of PostgreSQL, on a connection of its own.
  * Within the node, the lock of objects.c comes first.
  *
- * The database drops the lock with its connection, and others may then delete what was published meanwhile. So who
- * shares the lock also holds a number, a lock of the same connection that nobody else takes, and a transaction that
- * names objects commits only while that number is held (object_lock_check()). Who excludes others waits for the
- * transaction that runs, because it may have looked before the lock was lost. */
+ * The database drops the lock with its connection, and others may then delete what was published meanwhile. So a node
+ * that shares the lock also holds a number: a second lock of the same connection, which nobody else takes. A
+ * transaction that names objects commits only while that number is held (object_lock_check()). A node that excludes the
+ * others waits for the running transaction, because that may have looked before the lock was lost. */
 #ifndef ORB_STORE_OBJECT_LOCK_H
 #define ORB_STORE_OBJECT_LOCK_H
 
