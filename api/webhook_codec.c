@@ -56,7 +56,7 @@ static int read_events(const cJSON *list, unsigned *events, api_problem *problem
                             "\"events\" of \"webhook\" must be an array of succeeded, failed and cancelled.");
 }
 
-static int read_webhook(const cJSON *hook, api_webhook *out, api_problem *problem) {
+static int read_hook(const cJSON *hook, api_webhook *out, api_problem *problem) {
   static const char *const known[] = {"url", "events", NULL};
   if (!cJSON_IsObject(hook)) {
     return api_refuse(problem, "invalid-request", "\"webhook\" must be an object such as {\"url\": \"https://…\"}.");
@@ -79,7 +79,7 @@ int api_webhook_take(cJSON *body, api_webhook *out, api_problem *problem) {
   out->url[0] = 0;
   out->events = 0;
   cJSON *hook = cJSON_IsObject(body) ? cJSON_DetachItemFromObjectCaseSensitive(body, "webhook") : NULL;
-  int fine = !hook || read_webhook(hook, out, problem);
+  int fine = !hook || read_hook(hook, out, problem);
   cJSON_Delete(hook);
   return fine;
 }

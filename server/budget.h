@@ -16,7 +16,7 @@ typedef enum budget_part { BUDGET_JOBS, BUDGET_CHECKS, BUDGET_SMALL, BUDGET_PART
 
 memory_budget *budget_create(int64_t job_memory); /* NULL: out of memory */
 void budget_destroy(memory_budget *b);
-/* Sets a function that is called when memory has become free that someone asked for. Before threads start; at most
+/* Sets a function that is called when memory becomes free after a call found too little. Before threads start; at most
  * BUDGET_LISTENERS. */
 enum { BUDGET_LISTENERS = 4 };
 void budget_listen(memory_budget *b, void (*freed)(void *user), void *user);
@@ -26,10 +26,10 @@ int64_t budget_most(const memory_budget *b, budget_part part);
 /* 1: taken. 0: there is no room now. bytes: at most budget_most(). */
 int budget_take(memory_budget *b, budget_part part, int64_t bytes);
 int budget_has_room(memory_budget *b, budget_part part, int64_t bytes);
-/* The room of a part, below 0 if it lent more than it has. Unlike the calls above, it is no shortage if that is little.
+/* The room of a part, below 0 if it lent more than it has. Unlike the calls above, this one never counts as a shortage.
  */
 int64_t budget_left(memory_budget *b, budget_part part);
-/* Changes whenever someone finds too little room: who keeps memory for later gives it back then. */
+/* Changes whenever a caller finds too little room. Processes that keep memory for later use then give it back. */
 unsigned budget_shortages(memory_budget *b, budget_part part);
 void budget_wait(memory_budget *b, budget_part part, int64_t bytes); /* takes them as soon as there is room */
 /* Gives back what was taken. If there was too little room for someone since the last time, calls the listeners but that

@@ -1,8 +1,9 @@
 /* Thread pools for work that handlers must not do themselves: queries, commits, reading and checking files.
  *
- * Contract. Tasks of one owner start in the order in which they were added, each on one thread. Owners take turns:
- * first goes who has the fewest tasks running, then who has used the least time of threads; who comes back after a
- * pause starts level with the least served of the others. A task for which there is no memory lets others pass.
+ * Contract. Tasks of one owner start in the order in which they were added, each on one thread. Owners take turns: the
+ * owner with the fewest running tasks goes first, then the one that has used the least time of threads. An owner that
+ * returns after a pause starts level with the least served of the others. A task for which there is no memory lets
+ * others pass.
  * tasks_stop() runs the waiting tasks, then joins the threads.
  */
 #ifndef ORB_TASKS_H

@@ -85,7 +85,7 @@ step_fuzz() {
   local status=0
   build_release
   run_fuzz || status=$?
-  cut -d' ' -f1 build-fuzz/results >>"$totals"
+  count_fuzz >>"$totals"
   return $status
 }
 
@@ -117,20 +117,12 @@ start_browser() {
   rm -f build/browser/tests.xml
   echo "subdirs(\"$PWD/build\")" >build/browser/CTestTestfile.cmake
   ctest --test-dir build/browser --output-on-failure --output-junit "$PWD/build/browser/tests.xml" -L browser \
-    >build/browser/log 2>&1 &
+    >build/browser.log 2>&1 &
   browser=$! browser_began=$SECONDS
 }
 
-# Waits for them, and prints what they printed.
-finish_browser() {
-  local status=0 failures
-  failures=$(sum failed)
-  echo "== browser =="
-  wait "$browser" || status=$?
-  browser=
-  cat build/browser/log
-  count_junit build/browser/tests.xml >>"$totals" || status=1
-  ended browser $status "$browser_began" "$failures"
+count_browser() {
+  count_junit build/browser/tests.xml
 }
 
 # Starts the fuzz targets beside the steps that follow. Tests wait for a quarter of the cores' time; at this priority, the
@@ -141,15 +133,21 @@ start_fuzz() {
   fuzz=$! fuzz_began=$SECONDS
 }
 
-finish_fuzz() {
-  local status=0 failures
+count_fuzz() {
+  cut -d' ' -f1 build-fuzz/results
+}
+
+# Waits for the browser or the fuzz targets, prints what they printed, and adds their results to the totals.
+finish() {
+  local what=$1 status=0 failures pid began
+  pid=$what began=${what}_began
   failures=$(sum failed)
-  echo "== fuzz =="
-  wait "$fuzz" || status=$?
-  fuzz=
-  cat build/fuzz.log
-  cut -d' ' -f1 build-fuzz/results >>"$totals" || status=1
-  ended fuzz $status "$fuzz_began" "$failures"
+  echo "== $what =="
+  wait "${!pid}" || status=$?
+  printf -v "$what" ''
+  cat "build/$what.log"
+  "count_$what" >>"$totals" || status=1
+  ended "$what" $status "${!began}" "$failures"
 }
 
 # Without warnings as errors: it is for compilers that the rest of the tree has not met.
@@ -211,8 +209,8 @@ else
   run_step asan
   run_step release
   if [ -n "$browser" ]; then
-    finish_browser
-    finish_fuzz
+    finish browser
+    finish fuzz
   else
     run_step fuzz
   fi

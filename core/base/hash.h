@@ -1,7 +1,7 @@
 /* The hash of every table that is filled with data of callers.
  *
- * SipHash-1-3 under a random key of the context: nobody who does not know the key can choose data that collide. It is
- * written out here, because libsodium's is the slower SipHash-2-4 and core links no library for 40 lines. Results must
+ * SipHash-1-3 under a random key of the context: without the key, nobody can choose data that collide. It is written
+ * out here, because libsodium has only the slower SipHash-2-4, and core links no library for 40 lines. Results must
  * not depend on the order of the slots, since that differs from run to run.
  */
 #ifndef ORB_BASE_HASH_H

@@ -39,7 +39,7 @@ static orb_status carry_given(orb_context *ctx, orb_carry_source *source, orb_ca
   float *values = ORB_NEW(ctx, float, sets->width *corners);
   orb_status status = values ? ORB_OK : ORB_E_NO_MEMORY;
   for (int32_t i = 0; status == ORB_OK && i < sets->count; i++) {
-    orb_spots_blend(source->spots, corners, sets->values[i], sets->width, values);
+    orb_corner_blends_apply(source->blends, corners, sets->values[i], sets->width, values);
     if (!own || !same_values(own, values, sets->width * corners)) {
       status = carry_set(ctx, source, what, values, &out[*count]);
       *count += status == ORB_OK;

@@ -16,7 +16,7 @@ orb_status orb_carry_source_open(orb_context *ctx, orb_carry_source *source) {
   for (int32_t v = 0; v < given->file_vertex_count; v++) {
     source->used[v] = (unsigned char)(given->vertex_of_source[v] >= 0);
   }
-  return orb_spots_create(ctx, given, source->shape, source->file->corners, &source->spots);
+  return orb_corner_blends_create(ctx, given, source->shape, source->file->corners, &source->blends);
 }
 
 orb_status orb_carry_source_home(orb_context *ctx, orb_carry_source *source) {
@@ -31,7 +31,7 @@ orb_status orb_carry_source_home(orb_context *ctx, orb_carry_source *source) {
 void orb_carry_source_close(orb_context *ctx, orb_carry_source *source) {
   orb_free(ctx, source->home);
   orb_free(ctx, source->used);
-  orb_free(ctx, source->spots);
+  orb_free(ctx, source->blends);
 }
 
 orb_given_file orb_carry_given(const orb_carry_source *source) {
@@ -43,11 +43,11 @@ void orb_carry_blend(const orb_carry_source *source, int32_t vertex, orb_blend *
   const orb_place *place = &supermesh->places[(int64_t)source->number * supermesh->vertex_count + vertex];
   out->count = 0;
   for (int k = 0; k < 3; k++) {
-    const orb_spot *spot = &source->spots[3 * (int64_t)place->triangle + k];
+    const orb_corner_blend *blend = &source->blends[3 * (int64_t)place->triangle + k];
     for (int i = 0; i < 3; i++) {
-      double weight = place->at[k] * spot->weight[i];
+      double weight = place->at[k] * blend->weight[i];
       if (weight > 0) {
-        out->vertex[out->count] = spot->vertex[i];
+        out->vertex[out->count] = blend->vertex[i];
         out->weight[out->count++] = weight;
       }
     }

@@ -2,7 +2,7 @@
 #ifndef ORB_CARRY_SOURCE_H
 #define ORB_CARRY_SOURCE_H
 
-#include "carry/spots.h"
+#include "carry/corner_blend.h"
 #include "format/gltf_given.h"
 #include "orbmorph/carry.h"
 
@@ -12,12 +12,12 @@ typedef struct orb_carry_source {
   const orb_aligned_shape *shape;
   const orb_mesh *given; /* before the alignment */
   const orb_shape_file *file;
-  orb_spot *spots;     /* of the corners of the aligned mesh; NULL: not glTF */
-  int32_t *home;       /* see orb_home_triangles(); NULL: not yet needed */
-  unsigned char *used; /* per vertex of the file: whether it is on the closed surface */
+  orb_corner_blend *blends; /* of the corners of the aligned mesh; NULL: not glTF */
+  int32_t *home;            /* see orb_home_triangles(); NULL: not yet needed */
+  unsigned char *used;      /* per vertex of the file: whether it is on the closed surface */
 } orb_carry_source;
 
-/* Fills spots and used, if the file is glTF. Free also after an error. */
+/* Fills blends and used, if the file is glTF. Free also after an error. */
 ORB_MUST_CHECK orb_status orb_carry_source_open(orb_context *ctx, orb_carry_source *source);
 /* Fills home. */
 ORB_MUST_CHECK orb_status orb_carry_source_home(orb_context *ctx, orb_carry_source *source);

@@ -3,7 +3,7 @@
  * together solve a linear system in which edges want to be what these rotations make of them. From round to round pulls
  * grow stronger.
  *
- * The first rotations come from the rough map: what it does with the surroundings of each vertex. From the rotation of
+ * The first rotations come from the rough map: how it rotates the surroundings of each vertex. From the rotation of
  * the whole instead, an arm that is raised by 150° stays wrung, since rotations of neighbours hold each other. */
 #include "elastic/elastic.h"
 

@@ -1,8 +1,8 @@
 /* Non-rigid registration of one surface to another, as rigid as possible.
  *
- * Comes in: two meshes of a few thousand vertices, and a rough map between them or places where the first one lies
- * already. Goes out: where the first one goes so that it lies on the second, and how much that bends it. A rough map of
- * the right limbs bends little, and a wrong one bends much, whatever tips of limbs it is a little off by: so the cost
+ * In: two meshes of a few thousand vertices, and a rough map between them or places where the first one lies
+ * already. Out: where the first one goes so that it lies on the second, and how much that bends it. A rough map of the
+ * right limbs bends little, even if it misses their tips by a little. A map of the wrong limbs bends much. So the cost
  * ranks maps. Read in this order:
  *
  *   body.h     a mesh with what the steps read

@@ -295,7 +295,7 @@ static orb_status find_labels(work *w) {
   return status;
 }
 
-static orb_status room(work *w, int32_t more) {
+static orb_status make_room(work *w, int32_t more) {
   if (w->found_count == w->found_room) {
     w->found_room = 2 * w->found_room + 64;
     if (!orb_regrow(w->s->ctx, &w->found, (size_t)w->found_room, sizeof *w->found)) {
@@ -329,7 +329,7 @@ static orb_status keep(work *w, int32_t closing) {
   for (int32_t v = a; v != meet; v = origin(w, w->parent[v])) {
     down++;
   }
-  ORB_TRY(room(w, down + 1 + up));
+  ORB_TRY(make_room(w, down + 1 + up));
   orb_cycle *cycle = &w->found[w->found_count++];
   *cycle = (orb_cycle){.start = w->pool_count, .count = down + 1 + up};
   int32_t *out = w->pool + w->pool_count, at = down;

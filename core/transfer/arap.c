@@ -20,8 +20,8 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "numeric/vec3.h"
-#include "transfer/coarse.h"
 #include "transfer/graph.h"
+#include "transfer/groups.h"
 #include "transfer/laplace.h"
 #include "transfer/rotation.h"
 
@@ -41,7 +41,7 @@ struct orb_arap {
   int32_t vertex_count;
   orb_edge_graph graph;
   double *rotation; /* per vertex: its rotation vector */
-  orb_coarse coarse;
+  orb_groups groups;
   double whole[3]; /* rotation vector of b as a whole */
   double middle_a[3], middle_b[3];
 };
@@ -51,7 +51,7 @@ void orb_arap_destroy(orb_context *ctx, orb_arap *path) {
     orb_free(ctx, path->b);
     orb_edge_graph_free(ctx, &path->graph);
     orb_free(ctx, path->rotation);
-    orb_coarse_free(ctx, &path->coarse);
+    orb_groups_free(ctx, &path->groups);
     orb_free(ctx, path);
   }
 }
@@ -203,8 +203,8 @@ orb_status orb_arap_create(orb_context *ctx, const double *a, const double *b, i
     status = make_rotations(ctx, path);
   }
   if (status == ORB_OK) {
-    status = orb_coarse_create(ctx, path->graph.first, path->graph.neighbor, path->graph.weight, vertex_count,
-                               &path->coarse);
+    status = orb_groups_create(ctx, path->graph.first, path->graph.neighbor, path->graph.weight, vertex_count,
+                               &path->groups);
   }
   if (status != ORB_OK) {
     orb_arap_destroy(ctx, path);
@@ -285,7 +285,7 @@ static orb_status solve_at(orb_context *ctx, orb_arap *path, double t, double *r
     }
   }
   orb_free(ctx, side.sums);
-  return orb_laplace_solve(ctx, &path->graph, &path->coarse, TOLERANCE * TOLERANCE * (sum[0] + sum[1] + sum[2]), r, x);
+  return orb_laplace_solve(ctx, &path->graph, &path->groups, TOLERANCE * TOLERANCE * (sum[0] + sum[1] + sum[2]), r, x);
 }
 
 orb_status orb_arap_at(orb_context *ctx, orb_arap *path, double t, double *out) {

@@ -1,4 +1,4 @@
-/* Conjugate gradients, preconditioned by the diagonal and the groups' correction (coarse.h). */
+/* Conjugate gradients, preconditioned by the diagonal and the groups' correction (groups.h). */
 #include "transfer/laplace.h"
 
 #include <string.h>
@@ -14,7 +14,7 @@ enum { MAX_ITERATIONS = 3000 }; /* some hundred are usual; rounding must not kee
 typedef struct solver {
   const orb_edge_graph *graph;
   double *x, *r, *p, *q;
-  orb_coarse *coarse; /* its sums are the correction of the current r */
+  orb_groups *groups; /* its sums are the correction of the current r */
   double (*sums)[3];  /* per chunk */
   double step[3];
   double beta[3];
@@ -63,7 +63,7 @@ static void precondition_body(void *arg, int64_t begin, int64_t end, int thread)
   double sum[3] = {0};
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
-    const double *shift = s->coarse->sums + 3 * (int64_t)s->coarse->group[v];
+    const double *shift = s->groups->sums + 3 * (int64_t)s->groups->group[v];
     for (int c = 0; c < 3; c++) {
       s->q[3 * v + c] = s->r[3 * v + c] / s->graph->diagonal[v] + shift[c];
       sum[c] += s->q[3 * v + c] * s->r[3 * v + c];
@@ -98,7 +98,7 @@ static orb_status solve(orb_context *ctx, solver *s, double limit) {
   double rho[3] = {0}, now[3];
   for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
     ORB_TRY(orb_context_check(ctx));
-    orb_coarse_solve(s->coarse, s->r);
+    orb_groups_solve(s->groups, s->r);
     run(ctx, s, precondition_body, now);
     for (int c = 0; c < 3; c++) {
       s->beta[c] = rho[c] > 0 ? now[c] / rho[c] : 0;
@@ -117,10 +117,10 @@ static orb_status solve(orb_context *ctx, solver *s, double limit) {
   return ORB_OK;
 }
 
-orb_status orb_laplace_solve(orb_context *ctx, const orb_edge_graph *graph, orb_coarse *coarse, double limit, double *r,
+orb_status orb_laplace_solve(orb_context *ctx, const orb_edge_graph *graph, orb_groups *groups, double limit, double *r,
                              double *x) {
   int64_t n = 3 * (int64_t)graph->vertex_count, chunks = ((int64_t)graph->vertex_count + GRAIN - 1) / GRAIN;
-  solver s = {.graph = graph, .x = x, .r = r, .coarse = coarse};
+  solver s = {.graph = graph, .x = x, .r = r, .groups = groups};
   s.p = ORB_NEW0(ctx, double, n);
   s.q = ORB_NEW(ctx, double, n);
   s.sums = orb_alloc(ctx, (size_t)chunks, sizeof *s.sums);

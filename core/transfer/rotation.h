@@ -3,7 +3,7 @@
 #define ORB_TRANSFER_ROTATION_H
 
 /* h[i][j] = Σ w a_i b_j over vectors a and their images b. q: the unit quaternion (w, x, y, z; w ≥ 0) of the rotation R
- * that maximises Σ w b·Ra. Source: Horn 1987, by Jacobi rotations on his 4×4 matrix. Never a reflection. */
+ * that maximises Σ w b·Ra. Source: Horn 1987; Jacobi rotations diagonalise the 4×4 matrix. Never a reflection. */
 void orb_rotation_fit(double h[3][3], double q[4]);
 
 /* The same rotation as a vector: along the axis, as long as the angle in radians (0 to π). */

@@ -56,7 +56,8 @@ static int same_corner(const stream_list *list, int64_t a, int64_t b) {
   return 1;
 }
 
-int orb_draft_is_hole(const orb_draft *draft, int64_t triangle) {
+/* Whether a triangle of the supermesh lies in a hole that is open again, so that no part has it. */
+static int is_hole(const orb_draft *draft, int64_t triangle) {
   return draft->has_holes && draft->shapes[0].mesh.source_triangle[draft->home[triangle]] == ORB_MADE_FILL;
 }
 
@@ -77,7 +78,7 @@ static orb_status fill_part(orb_context *ctx, const orb_draft *draft, const stre
   int32_t made = 0;
   int64_t index = 0;
   for (int32_t t = 0; t < draft->supermesh->triangle_count; t++) {
-    if (orb_draft_is_hole(draft, t) || orb_draft_material(draft, t) != part->material) {
+    if (is_hole(draft, t) || orb_draft_material(draft, t) != part->material) {
       continue;
     }
     for (int k = 0; k < 3; k++) {
@@ -147,7 +148,7 @@ static orb_status make_parts(orb_context *ctx, orb_draft *draft) {
   draft->parts = ORB_NEW0(ctx, orb_draft_part, materials);
   orb_status status = used && draft->parts ? ORB_OK : ORB_E_NO_MEMORY;
   for (int32_t t = 0; status == ORB_OK && t < draft->supermesh->triangle_count; t++) {
-    used[orb_draft_material(draft, t)] += !orb_draft_is_hole(draft, t);
+    used[orb_draft_material(draft, t)] += !is_hole(draft, t);
   }
   for (int32_t m = 0; status == ORB_OK && m < materials; m++) {
     if (used[m] == 0) {

@@ -7,9 +7,6 @@
 /* The material of a triangle of the supermesh: that of the first shape at its centre. */
 int32_t orb_draft_material(const orb_draft *draft, int64_t triangle);
 
-/* Whether a triangle of the supermesh lies in a hole that is open again, so that no part has it. */
-int orb_draft_is_hole(const orb_draft *draft, int64_t triangle);
-
 /* Fills draft->parts, with triangles and vertices in an order that suits the caches of graphics processors. */
 ORB_MUST_CHECK orb_status orb_draft_split(orb_context *ctx, orb_draft *draft);
 

@@ -9,7 +9,7 @@
 #include "net/url.h"
 #include "store/webhooks.h"
 
-/* Every address is taken here: the one who holds the data folder may name any, and the daemon checks each when it
+/* Accepts every address: the owner of the data folder may name any, and the daemon checks the address when it
  * connects. */
 static int read_url(const char *value, char word[ADMIN_WORD]) {
   static const char everything[] = "0.0.0.0/0,::/0";

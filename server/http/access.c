@@ -153,7 +153,7 @@ int access_priority(const request *r) {
   return QUEUE_URGENCIES * class + QUEUE_URGENCIES - 1 - parse_urgency(header_of(r, "Priority"));
 }
 
-/* Unless who calls is refused, or may see what others own, the log says nothing of a request that succeeds. */
+/* The audit log names refused callers, deletions, and reads with the scope admin. It names no other request. */
 static const char *audited(const request *r) {
   int admin = r->caller && (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
   return r->status == 401 || r->status == 403                                         ? "refused"

@@ -135,7 +135,7 @@ int region_free(void *bytes) {
   return 1;
 }
 
-/* The file of a region that `part` begins and lies in; −1: it is none. Whoever sends a region keeps it alive. */
+/* The file of the region that `part` begins and lies in; −1: there is none. The sender of a region keeps it alive. */
 static int file_of(const struct iovec *part) {
   int fd = -1;
   if (part->iov_len >= LEAST) {

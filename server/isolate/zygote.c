@@ -119,7 +119,7 @@ static void on_death(int number) {
   errno = saved;
 }
 
-/* Reports the statuses of the dead to those who wait for them. */
+/* Reports the exit statuses of children that have ended. */
 static void bury(void) {
   int status;
   for (pid_t pid; (pid = waitpid(-1, &status, WNOHANG)) > 0;) {

@@ -6,7 +6,7 @@
 #include "queue/internal.h"
 #include "wake.h"
 
-enum { SHARED_EVENT_MS = 1000 };        /* for those who watch a job from other nodes */
+enum { SHARED_EVENT_MS = 1000 };        /* for requests on other nodes that watch a job */
 enum { TIMER_MS = 100, MOVE_MS = 300 }; /* how often waiters, and the progress of silent stages, are looked at */
 #define DEPENDENCIES_SHARE 0.25         /* of the progress of a supermesh whose embeddings are made first */
 

@@ -300,8 +300,8 @@ void queue_put_off(queue *q, job *j) {
   pthread_mutex_unlock(&q->lock);
 }
 
-/* The mark in the catalogue reaches whoever runs the job, or claims it at this moment. A job that nobody runs ends
- * here; it may be claimed, or put to wait, at the same moment. */
+/* The mark in the catalogue reaches the node that runs the job, or claims it at this moment. A job that no node runs
+ * ends here, although a node may claim it, or let it wait, at the same moment. */
 static store_result cancel_shared(queue *q, job *j) {
   enum { TRIES = 8 };
   job_mark mark;

@@ -15,13 +15,13 @@
 #include "store/spheres.h"
 
 enum {
-  PAGE = 64,          /* rows; each has at most RESOURCE_OBJECTS objects */
+  BATCH = 64,         /* rows; each has at most RESOURCE_OBJECTS objects */
   THREADS = 8,        /* S3 answers one request in some 20 ms, and many at once */
   BLOCK = 1 << 18,    /* bytes read at a time */
   AWAY_SECONDS = 300, /* for which S3 may be away before the move gives up */
 };
 
-/* An object of a page, and what became of it. */
+/* An object of a batch, and what became of it. */
 typedef struct item {
   const resource *row;
   named_object object;
@@ -31,13 +31,13 @@ typedef struct item {
   uint64_t bytes;
 } item;
 
-typedef struct page {
+typedef struct batch {
   const object_move *m;
-  resource rows[PAGE];
-  item items[PAGE * RESOURCE_OBJECTS];
+  resource rows[BATCH];
+  item items[BATCH * RESOURCE_OBJECTS];
   int row_count, count;
   int next, stopped; /* __atomic */
-} page;
+} batch;
 
 /* The hash of an object, by which a bucket's is known without being read. */
 static store_result hash_of(const depot *d, object_kind kind, const char *id, char sha[65]) {
@@ -194,49 +194,49 @@ static store_result move_item(const object_move *m, item *i) {
 }
 
 static void *work(void *user) {
-  page *p = user;
-  for (int k; !__atomic_load_n(&p->stopped, __ATOMIC_RELAXED) &&
-              (k = __atomic_fetch_add(&p->next, 1, __ATOMIC_RELAXED)) < p->count;) {
-    p->items[k].result = move_item(p->m, &p->items[k]);
-    if (p->items[k].result != STORE_OK) {
-      __atomic_store_n(&p->stopped, 1, __ATOMIC_RELAXED);
+  batch *b = user;
+  for (int k; !__atomic_load_n(&b->stopped, __ATOMIC_RELAXED) &&
+              (k = __atomic_fetch_add(&b->next, 1, __ATOMIC_RELAXED)) < b->count;) {
+    b->items[k].result = move_item(b->m, &b->items[k]);
+    if (b->items[k].result != STORE_OK) {
+      __atomic_store_n(&b->stopped, 1, __ATOMIC_RELAXED);
     }
   }
   return NULL;
 }
 
-/* Moves all objects of a page at once. */
-static store_result move_page(page *p) {
+/* Moves all objects of a batch at once. */
+static store_result move_batch(batch *b) {
   pthread_t threads[THREADS];
   int started = 0;
-  p->next = p->stopped = 0;
-  while (started < THREADS - 1 && pthread_create(&threads[started], NULL, work, p) == 0) {
+  b->next = b->stopped = 0;
+  while (started < THREADS - 1 && pthread_create(&threads[started], NULL, work, b) == 0) {
     started++;
   }
-  work(p);
+  work(b);
   for (int i = 0; i < started; i++) {
     pthread_join(threads[i], NULL);
   }
-  for (int k = 0; k < p->count; k++) {
-    if (p->items[k].result != STORE_OK) {
-      return p->items[k].result;
+  for (int k = 0; k < b->count; k++) {
+    if (b->items[k].result != STORE_OK) {
+      return b->items[k].result;
     }
   }
   return STORE_OK;
 }
 
 /* Reads the rows after `seq`. */
-static store_result read_page(page *p, int64_t seq) {
-  sql_statement *st = database_statement(p->m->rows,
+static store_result read_batch(batch *b, int64_t seq) {
+  sql_statement *st = database_statement(b->m->rows,
                                          "SELECT seq, kind, id, sha, json, bytes, created, places, quantized, meshopt"
                                          " FROM resource WHERE seq>?1 ORDER BY seq LIMIT ?2");
   int code = SQL_ERROR;
-  p->row_count = p->count = 0;
+  b->row_count = b->count = 0;
   if (st) {
     sql_bind_integer(st, 1, seq);
-    sql_bind_integer(st, 2, PAGE);
-    while (p->row_count < PAGE && (code = sql_step(st)) == SQL_ROW) {
-      resource *row = &p->rows[p->row_count];
+    sql_bind_integer(st, 2, BATCH);
+    while (b->row_count < BATCH && (code = sql_step(st)) == SQL_ROW) {
+      resource *row = &b->rows[b->row_count];
       if (!resource_rows.read(st, row) || row->kind < 0 || row->kind >= RESOURCE_KINDS) {
         resource_free(row);
         code = SQL_CORRUPT;
@@ -244,9 +244,9 @@ static store_result read_page(page *p, int64_t seq) {
       }
       named_object named[RESOURCE_OBJECTS];
       int count = resource_objects(row, named);
-      p->row_count++;
+      b->row_count++;
       for (int i = 0; i < count; i++) {
-        p->items[p->count++] = (item){.row = row, .object = named[i], .result = STORE_OK};
+        b->items[b->count++] = (item){.row = row, .object = named[i], .result = STORE_OK};
       }
     }
     sql_reset(st);
@@ -258,9 +258,9 @@ static store_result read_page(page *p, int64_t seq) {
   return STORE_OK;
 }
 
-static void free_page(page *p) {
-  for (int i = 0; i < p->row_count; i++) {
-    resource_free(&p->rows[i]);
+static void free_batch(batch *b) {
+  for (int i = 0; i < b->row_count; i++) {
+    resource_free(&b->rows[i]);
   }
 }
 
@@ -273,22 +273,22 @@ static store_result leave_out(const object_move *m, const resource *row) {
   return database_run(m->rows, st) == SQL_OK ? STORE_OK : STORE_ERROR;
 }
 
-static store_result count_page(const page *p, object_counts *counts) {
+static store_result count_batch(const batch *b, object_counts *counts) {
   store_result result = STORE_OK;
-  counts->rows += p->row_count;
-  counts->objects += p->count;
-  for (int k = 0; k < p->count && result == STORE_OK; k++) {
-    const item *i = &p->items[k];
+  counts->rows += b->row_count;
+  counts->objects += b->count;
+  for (int k = 0; k < b->count && result == STORE_OK; k++) {
+    const item *i = &b->items[k];
     if (!i->why) {
       counts->there += i->there;
       counts->sent += !i->there;
       counts->bytes += i->there ? 0 : (int64_t)i->bytes;
       continue;
     }
-    p->m->wrong(p->m->user, i->row, i->object.what, i->why);
+    b->m->wrong(b->m->user, i->row, i->object.what, i->why);
     if (i->row->kind == RESOURCE_ALIGNMENT) {
       counts->left_out++;
-      result = leave_out(p->m, i->row);
+      result = leave_out(b->m, i->row);
     } else {
       counts->wrong++;
     }
@@ -342,24 +342,24 @@ static store_result remove_others(const object_move *m, object_counts *counts) {
 
 store_result move_objects(const object_move *m, object_counts *counts) {
   store_result result = STORE_OK;
-  page *p = calloc(1, sizeof *p);
+  batch *b = calloc(1, sizeof *b);
   memset(counts, 0, sizeof *counts);
-  if (!p) {
+  if (!b) {
     return STORE_ERROR;
   }
-  p->m = m;
+  b->m = m;
   int64_t seq = INT64_MIN;
   for (int more = 1; more && result == STORE_OK;) {
-    result = read_page(p, seq);
-    result = result == STORE_OK ? move_page(p) : result;
-    result = result == STORE_OK ? count_page(p, counts) : result;
-    more = p->row_count == PAGE;
-    seq = p->row_count ? p->rows[p->row_count - 1].seq : seq;
-    free_page(p);
+    result = read_batch(b, seq);
+    result = result == STORE_OK ? move_batch(b) : result;
+    result = result == STORE_OK ? count_batch(b, counts) : result;
+    more = b->row_count == BATCH;
+    seq = b->row_count ? b->rows[b->row_count - 1].seq : seq;
+    free_batch(b);
     if (result == STORE_OK) {
       m->tell(m->user, counts);
     }
   }
-  free(p);
+  free(b);
   return result == STORE_OK && m->again ? remove_others(m, counts) : result;
 }

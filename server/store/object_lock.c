@@ -119,7 +119,7 @@ int64_t object_lock_number(void) {
   return number_of_thread;
 }
 
-/* Who takes the number knows that its connection is gone. */
+/* The number can be taken here only if the connection that held it is gone. */
 int object_lock_check(database *db, int64_t number) {
   if (!number) {
     return SQL_OK;

@@ -1,15 +1,15 @@
 /* The lock of objects over all nodes that share a bucket: an advisory lock of PostgreSQL, on a connection of its own.
  * Within the node, the lock of objects.c comes first.
  *
- * The database drops the lock with its connection, and others may then delete what was published meanwhile. So who
- * shares the lock also holds a number, a lock of the same connection that nobody else takes, and a transaction that
- * names objects commits only while that number is held (object_lock_check()). Who excludes others waits for the
- * transaction that runs, because it may have looked before the lock was lost.
+ * The database drops the lock with its connection, and others may then delete what was published meanwhile. So a node
+ * that shares the lock also holds a number: a second lock of the same connection, which nobody else takes. A
+ * transaction that names objects commits only while that number is held (object_lock_check()). A node that excludes the
+ * others waits for the running transaction, because that may have looked before the lock was lost.
  *
  * A node that deletes may lose the lock, too, between its last look and the moment at which S3 carries out its request.
  * So it announces each deletion in the catalogue for OBJECT_LOCK_DELETES_MS, by the database's clock, and signs the
- * request before, so that S3 refuses it long before that time is over (bucket_delete()). Who shares the lock while an
- * announcement stands waits until it is withdrawn or over. */
+ * request before, so that S3 refuses it long before that time is over (bucket_delete()). A node that shares the lock
+ * while an announcement stands waits until it is withdrawn or over. */
 #ifndef ORB_STORE_OBJECT_LOCK_H
 #define ORB_STORE_OBJECT_LOCK_H
 

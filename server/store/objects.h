@@ -77,8 +77,7 @@ store_result objects_load(const objects *store, object_kind kind, const char *id
 store_result objects_look(const objects *store, object_kind kind, const char *id);
 /* Whether reading an object asks no other machine now. */
 int objects_is_near(const objects *store, object_kind kind, const char *id);
-/* Whether objects are in a bucket, and whether that does not answer. */
-int objects_are_remote(const objects *store);
+/* Whether objects are in a bucket that does not answer. */
 int objects_are_away(const objects *store);
 /* A URL from which anyone may read an object for so many seconds; more: see s3_presign(). 0: there is none. */
 int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
@@ -101,7 +100,7 @@ store_result objects_delete(objects *store, object_kind kind, const char *id);
  * files stay until --gc. */
 void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user);
 /* Opens the lock file of backups. A backup holds it exclusively (flock()), so the kernel releases it with the process;
- * whoever deletes an object shares it for that moment. −1 with the reason logged. */
+ * a thread that deletes an object shares it for that moment. −1 with the reason logged. */
 int objects_backup_lock(const char *data);
 int objects_backup_runs(objects *store);
 /* Keeps backups waiting until objects_close(), so that nothing that this process deletes is held. 0: a backup runs. */

@@ -120,10 +120,6 @@ static store_result open_url(const char *data, const char *url, int shared, cons
   return result;
 }
 
-store_result catalogue_open_at(const char *data, const char *url, catalogue **out) {
-  return catalogue_open_among(data, url, 0, out);
-}
-
 store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out) {
   char path[PATH_MAX], mark[MARK];
   path_in(data, place_catalogue, path);
@@ -249,5 +245,5 @@ store_result stores_open(const store_place *place, objects **store, catalogue **
     return STORE_UNFIT;
   }
   store_result result = objects_open(place->data, store);
-  return result == STORE_OK ? catalogue_open_at(place->data, place->catalogue, cat) : result;
+  return result == STORE_OK ? catalogue_open_among(place->data, place->catalogue, 0, cat) : result;
 }

@@ -13,9 +13,7 @@
 
 /* url: of a database in PostgreSQL; NULL: SQLite. STORE_UNFIT: the two do not belong together, the database cannot be
  * written, its schema is newer than this program, or it refuses the credentials; nothing was written, and the log says
- * what is wrong. */
-store_result catalogue_open_at(const char *data, const char *url, catalogue **out);
-/* shared: a database in PostgreSQL is one of several nodes, as it is where objects are in a bucket. */
+ * what is wrong. shared: several nodes use the database, as they do where objects are in a bucket. */
 store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out);
 
 /* What ties them together: a hash of the catalogue's secret, in these two files of the data folder and in the bucket.

@@ -178,7 +178,7 @@ const char *const postgresql_migrations[] = {
     " IF TG_OP='INSERT' THEN RETURN NULL; END IF;"
     " IF NEW.state<>OLD.state OR NEW.attempt<>OLD.attempt THEN PERFORM tell(TG_TABLE_SCHEMA, 'j' || NEW.id); END IF;"
     " IF NEW.cancel>OLD.cancel THEN PERFORM tell(TG_TABLE_SCHEMA, 'c' || NEW.id); END IF;"
-    /* The end of a job lets those go on that wait for it. Who is cancelled cancels what only he needed. */
+    /* The end of a job releases the jobs that wait for it. A cancelled job cancels the jobs that only it needed. */
     " IF NEW.state>=2 AND OLD.state<2 THEN"
     "  IF NEW.state=4 THEN UPDATE job e SET cancel=1 FROM need d WHERE d.job=NEW.id AND e.key=d.key"
     "   AND e.owner=d.owner AND e.state<2 AND e.listed=0 AND NOT EXISTS(SELECT 1 FROM need o WHERE o.key=d.key"

@@ -10,8 +10,9 @@
 
 /* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner. Owners with ready jobs, each
  * with the first one that fits, in the order of fairness (queue/queue.h). While a suspect waits, one node keeps its
- * workers. Of an owner it looks at his first LOOK_AT jobs only, and where none of them fits, at his LOOK_AT smallest: a
- * claim that finds none must not read a million. Which kind is text, so that each has an index of its own. */
+ * workers. The query looks at the first LOOK_AT jobs of each owner only, and where none of them fits, at the LOOK_AT
+ * smallest: a claim that finds none must not read a million. The kind is part of the text, so that each kind uses its
+ * own index. */
 #define LOOK_AT "64"
 #define FITS(of_kind, order)                                                                                  \
   "(SELECT j.id, j.priority, j.seq, j.suspect FROM"                                                           \

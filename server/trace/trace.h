@@ -1,9 +1,9 @@
-/* Traces for OpenTelemetry: what a request and its job did when, as spans. Off unless send.h is started: then each call
- * costs one look at a flag.
+/* Traces for OpenTelemetry: spans that say what a request and its job did, and when. Nothing is recorded unless send.h
+ * is started; each call then costs one look at a flag.
  *
- * A span is named by a traceparent of W3C Trace Context: "00-TRACE-SPAN-FLAGS". Who begins a span gets its name; those
- * below it take that name as their parent, also on another node, because the row of a job has it. A caller whose
- * traceparent says that he records nothing gets nothing recorded. */
+ * A span is named by a traceparent of W3C Trace Context: "00-TRACE-SPAN-FLAGS". The code that begins a span gets its
+ * name, and spans below it name it as their parent, also on another node, because the row of a job stores it. If the
+ * traceparent of a request says that its sender does not record, nothing is recorded for it. */
 #ifndef ORB_TRACE_TRACE_H
 #define ORB_TRACE_TRACE_H
 

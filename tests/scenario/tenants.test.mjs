@@ -218,10 +218,10 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   assert.equal((await d.get(hers.url, bob)).json.state, 'queued', 'the work is not done twice at once');
   assertProblem(await d.delete(hers.url, ann), 404, 'not-found');
   assert.equal((await d.delete(his.url, ann)).status, 200);
-  await until(async () => (await d.get(hers.url, bob)).json.state === 'running', 'his comes to be worked on');
+  await until(async () => (await d.get(hers.url, bob)).json.state === 'running', 'his job runs');
   assert.equal((await d.delete(hers.url, bob)).status, 200);
 
-  // What Ann has is made for Bob anew as far as he can see, but for the time it takes.
+  // Bob cannot see that Ann has the result already, except by the time that it takes.
   const one = await end(ann, (await ask(ann)).json);
   // The one worker is busy with Ann's job, and Bob's other job runs beside it, while Bob looks: a result that is there
   // comes at once.

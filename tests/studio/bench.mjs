@@ -143,22 +143,8 @@ try {
   await step('start', page, () => page.goto(url));
   await step('open two shapes', page, async () => {
     await page.locator('input[type=file]').first().setInputFiles(files);
-    await until(
-      () =>
-        page
-          .locator('.card.ready .facts.good')
-          .count()
-          .then((n) => n === 2),
-      'both uploaded',
-    );
-    await until(
-      () =>
-        page
-          .locator('.caption .muted', { hasText: 'triangles' })
-          .count()
-          .then((n) => n === 2),
-      'both drawn',
-    );
+    await counted(page.locator('.card.ready .facts.good'), 2, 'both uploaded');
+    await counted(page.locator('.caption .muted', { hasText: 'triangles' }), 2, 'both drawn');
     await page.waitForTimeout(1500);
   });
   await step('pick', page, async () => {

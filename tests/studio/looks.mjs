@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import {
   addFiles,
+  counted,
   adopt,
   button,
   clickView,
@@ -61,16 +62,9 @@ const slide = (page, name, value) =>
   }, value);
 async function spheres(page) {
   await button(page, 'Spheres').click();
-  await until(
-    () =>
-      page
-        .getByText('Certified one to one')
-        .count()
-        .then((n) => n === 2),
-    'both are embedded',
-  );
+  await counted(page.getByText('Certified one to one'), 2, 'both are embedded');
   const working = page.locator('.centered').getByRole('progressbar');
-  await until(() => working.count().then((n) => n === 0), 'both spheres are loaded');
+  await counted(working, 0, 'both spheres are loaded');
 }
 
 /** name: [steps that lead to the scene, options of the page] */
@@ -130,14 +124,7 @@ export const SCENES = {
     async (page) => {
       await morphed(page);
       await button(page, 'Error').click();
-      await until(
-        () =>
-          page
-            .locator('.pane .legend')
-            .count()
-            .then((n) => n === 2),
-        'both are measured',
-      );
+      await counted(page.locator('.pane .legend'), 2, 'both are measured');
     },
   ],
   'use-it': [
@@ -159,14 +146,7 @@ export const SCENES = {
       await spheres(page);
       await button(page, 'Checkerboard').click();
       await button(page, 'After').click();
-      await until(
-        () =>
-          page
-            .getByText('on the common sphere')
-            .count()
-            .then((n) => n === 2),
-        'they are aligned',
-      );
+      await counted(page.getByText('on the common sphere'), 2, 'they are aligned');
       await until(
         () =>
           page

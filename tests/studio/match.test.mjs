@@ -3,29 +3,29 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { figure, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { addFiles, button, countPixels, defaultShown, json, openPage, sample, settled, until } from './support.mjs';
+import { landmarks, morph, shownId } from './steps.mjs';
+import { addFiles, button, countPixels, json, openPage, sample, settled, until } from './support.mjs';
 
 const said = (page) => page.getByRole('status', { name: 'How sure the match is' });
 const says = (page, pattern, what) => until(async () => pattern.test(await said(page).innerText()), what);
 const shown = (page) => page.url().match(/r=([0-9a-f]{64})/)?.[1];
 
-async function morphed(page, count) {
-  await button(page, `Morph ${count} shapes`).click();
-  await until(() => button(page, 'Pause').count(), 'the morph plays');
-  await defaultShown(page);
-  const link = await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href');
-  return json(daemon.url, `/v1/supermeshes/${link.match(/[0-9a-f]{64}/)[0]}`);
+/** Morphs the shapes, and returns the result's resource. */
+async function morphed(page) {
+  await morph(page);
+  return json(daemon.url, `/v1/supermeshes/${await shownId(page)}`);
 }
 
 /** The id of the morph that a request gives. A job that takes longer than one wait answers with its own id, half as long. */
 async function idOf(request) {
   const headers = { 'content-type': 'application/json', prefer: 'wait=60' };
   for (;;) {
-    const { id } = await json(daemon.url, '/v1/supermeshes', {
+    const { id, state, problem } = await json(daemon.url, '/v1/supermeshes', {
       method: 'POST',
       headers,
       body: JSON.stringify(request),
     });
+    assert.ok(id && state !== 'failed', JSON.stringify(problem));
     if (/^[0-9a-f]{64}$/.test(id)) return id;
   }
 }
@@ -33,7 +33,7 @@ async function idOf(request) {
 test('three shapes: verdict, doubt, heat map, and the matches one after another, also after a reload', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'), sample('elephant.ply'));
-  const first = await morphed(page, 3);
+  const first = await morphed(page);
   assert.equal(first.match.verdict, 'unsure');
   assert.deepEqual(
     first.alternatives.map(({ shape }) => shape),
@@ -78,7 +78,7 @@ test('Flip swaps left and right and back, also after a reload', async () => {
     buffer: Buffer.from(obj(body)),
   }));
   await addFiles(page, ...files);
-  const first = await morphed(page, 3);
+  const first = await morphed(page);
   const [other] = first.alternatives;
   // what it takes from the left (x < 0) of the first figure lies on the right of the other one, and the other way round
   const across = ({ point, vertex, triangle, barycentric }, { positions, triangles }) => {
@@ -107,5 +107,62 @@ test('Flip swaps left and right and back, also after a reload', async () => {
   const second = await openPage(browser, daemon.url, { hash });
   await says(second.page, new RegExp(`^Match 2 of ${1 + first.alternatives.length};`), 'the second, when it is done');
   await second.done();
+  await done();
+});
+
+test('an unsure match is labelled, and the next match gives another morph', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
+  const first = await morphed(page);
+  assert.equal(first.match.verdict, 'unsure');
+  await says(
+    page,
+    /^Not sure: the \w+ front limb of dog may be the \w+ front limb of elephant\. Look/,
+    'the doubt in words',
+  );
+  assert.doesNotMatch(await page.locator('.report').first().textContent(), /exact/, 'no landmarks were given');
+  const id = await idOf(first.alternatives[0].request);
+  await button(page, 'Next match').click();
+  await until(() => shown(page) === id, 'the first alternative is shown');
+  await says(page, /^Match 2 of /, 'it is called the second');
+  assert.doesNotMatch(await page.locator('.report').first().textContent(), /exact/, 'its landmarks were found');
+  for (let i = 0; i < first.alternatives.length; i++) {
+    await button(page, 'Next match').click();
+    await until(async () => !(await button(page, 'Next match').isDisabled()), 'the next one is shown');
+  }
+  await until(() => shown(page) === first.id, 'after the last comes the first');
+  assert.equal(await button(page, 'Flip').count(), 0, 'the other match takes head to foot');
+  // there and back again; what led to it is listed
+  await button(page, 'Next match').click();
+  await until(() => shown(page) === id, 'the other match');
+  await button(page, 'Landmarks').click();
+  const pairs = first.alternatives[0].request.landmarks.length;
+  await until(async () => (await landmarks(page).count()) === pairs, 'its landmarks');
+  await button(page, 'Morph', { exact: true }).click();
+  await button(page, 'Next match').click();
+  await until(() => shown(page) === first.id, 'the first one again');
+  // the heat map: blue where the surface is as it was, red where it is stretched badly
+  await button(page, 'Heat map').click();
+  await until(() => page.getByText(/^99 % of it below/).count(), 'it is measured');
+  await settled(page);
+  assert.equal(await page.locator('.pane').count(), 2);
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => b > r + 15 && b > g && r < 70)) > 5000, 'blue');
+  assert.ok((await countPixels(page, '.pane-view', (r, g, b) => r > 120 && r > 2 * g && r > 1.5 * b)) > 100, 'red');
+  // what was found is in the list, and given once it is corrected
+  await button(page, 'Landmarks').click();
+  await until(async () => (await landmarks(page).count()) === first.landmarks.length, 'the found landmarks');
+  const hint = page.locator('.action .hint');
+  assert.match(await hint.innerText(), /matched without landmarks/);
+  await until(() => /tab=landmarks/.test(page.url()), 'the URL names the view');
+  await page.reload();
+  await until(async () => (await landmarks(page).count()) === first.landmarks.length, 'they are back');
+  assert.match(await hint.innerText(), /matched without landmarks/);
+  const name = page.getByRole('textbox', { name: 'Name of landmark 1', exact: true });
+  await name.fill('tail');
+  await name.press('Tab');
+  await until(
+    async () => (await hint.innerText()) === `${first.landmarks.length} landmarks will meet exactly.`,
+    'given',
+  );
   await done();
 });

@@ -1,9 +1,10 @@
 // Meshes that are refused, and the buttons that mend them.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import { grating, obj } from '../scenario/support/shapes.mjs';
+import { readFile } from 'node:fs/promises';
+import { grating, obj, torus } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { button, countPixels, json, openPage, settled, until } from './support.mjs';
+import { button, countPixels, json, openPage, sample, settled, until } from './support.mjs';
 
 const red = (page) => countPixels(page, '.pane-view', (r, g, b) => r > 180 && g < 110 && b < 110);
 const digits = (text) => Number(text.replace(/\D/g, ''));
@@ -69,5 +70,80 @@ test('holes and handles of one mesh are mended by a button each', async () => {
     ['fill_holes', 'close_handles'].map((kind) => mesh.repairs.some((r) => r.kind === kind && r.count > 0)),
     [true, true],
   );
+  await done();
+});
+
+test('a refused mesh says why, shows the rim in red, and can be repaired', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  // the dog without its first 40 faces
+  let left = 40;
+  const text = (await readFile(sample('dog.obj'), 'utf8'))
+    .split('\n')
+    .filter((line) => !(line.startsWith('f ') && left-- > 0))
+    .join('\n');
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(text) });
+  await page.locator('.card.refused').waitFor();
+  assert.match(await page.getByRole('alert').innerText(), /hole/);
+  await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
+  // the lines are drawn over the surface, so the rim is visible from any side
+  await settled(page);
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110)) > 20, 'red is drawn');
+  await button(page, 'Fill the holes').click();
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
+  assert.equal(await page.locator('.card.refused').count(), 0);
+  await settled(page);
+  assert.equal(await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110), 0, 'no red is left');
+  await done();
+});
+
+test('loose pieces are shown in red, and the largest can be kept', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const text = await readFile(sample('dog.obj'), 'utf8');
+  const known = text.split('\n').filter((line) => line.startsWith('v '));
+  const [x, y, z] = [0, 1, 2].map((k) => Math.max(...known.map((line) => Number(line.split(/\s+/)[k + 1]))));
+  const size = 0.2 * y;
+  const corners = [
+    [0, 0, 0],
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ].map((c) => `v ${[x, y, z].map((at, k) => at + size * (c[k] - 0.5)).join(' ')}`);
+  const faces = [
+    [1, 3, 2],
+    [1, 2, 4],
+    [2, 3, 4],
+    [1, 4, 3],
+  ].map((f) => `f ${f.map((v) => v + known.length).join(' ')}`);
+  const both = [...known, ...corners, ...text.split('\n').filter((line) => line.startsWith('f ')), ...faces].join('\n');
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'two.obj', mimeType: 'text/plain', buffer: Buffer.from(`${both}\n`) });
+  await page.locator('.card.refused').waitFor();
+  await until(() => page.getByText('Shown in red on the model.').count(), 'the loose piece is found');
+  await settled(page);
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 150 && g < 110 && b < 110)) > 50, 'red is drawn');
+  await button(page, 'Keep the largest piece').click();
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
+  await done();
+});
+
+test('the loop around a handle is shown in red, and the handle can be closed', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const file = { name: 'ring.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(torus())) };
+  await page.locator('input[type=file]').first().setInputFiles(file);
+  await page.locator('.card.refused').waitFor();
+  await until(() => page.getByText('Shown in red on the model.').count(), 'the loop is found');
+  await settled(page);
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110)) > 20, 'red is drawn');
+  assert.match(
+    await page.getByRole('list', { name: 'Handles' }).innerText(),
+    /^Handle 1: its loop is \d+ % of the diagonal/,
+  );
+  await button(page, 'Close the handle along the red loop').click();
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
   await done();
 });

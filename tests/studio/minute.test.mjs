@@ -9,6 +9,7 @@ import { join } from 'node:path';
 import { browser, daemon } from './started.mjs';
 import {
   addFiles,
+  counted,
   button,
   countPixels,
   defaultShown,
@@ -47,14 +48,7 @@ test('the first page plays a morph without a click, and offers three more', asyn
   assert.equal((await (await fetch(`${daemon.url}/v1/jobs`)).json()).jobs.length, 0, 'the daemon computed nothing');
   // the shapes that play can be opened, and are accepted
   await button(page, 'Try with samples').click();
-  await until(
-    () =>
-      page
-        .locator('.card.ready')
-        .count()
-        .then((n) => n === 3),
-    'its shapes are open',
-  );
+  await counted(page.locator('.card.ready'), 3, 'its shapes are open');
   await done();
 });
 
@@ -104,14 +98,7 @@ test('progress names the stage, says what is left, moves each second, and can be
   assert.equal(seen.size, 4, `the clock moves each second: ${[...seen]}`);
   assert.ok((await bar()) > begin && (await bar()) < 100, 'and the bar between reports');
   await button(page, 'Cancel').click();
-  await until(
-    () =>
-      page
-        .locator('.progress')
-        .count()
-        .then((n) => n === 0),
-    'the progress is gone',
-  );
+  await counted(page.locator('.progress'), 0, 'the progress is gone');
   assert.ok(cancelled);
   await done();
 });

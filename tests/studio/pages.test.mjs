@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
 import { browser, daemon } from './started.mjs';
-import { addFiles, button, difference, defaultShown, openPage, sample, settled, until } from './support.mjs';
+import { addFiles, counted, button, difference, defaultShown, openPage, sample, settled, until } from './support.mjs';
 
 let axe;
 before(async () => {
@@ -133,14 +133,7 @@ for (const colorScheme of ['light', 'dark'])
     found.server = await findings(page);
     await button(page, 'Close').click();
     await button(page, 'Spheres').click();
-    await until(
-      () =>
-        page
-          .getByText('Certified one to one')
-          .count()
-          .then((n) => n === 2),
-      'spheres',
-    );
+    await counted(page.getByText('Certified one to one'), 2, 'spheres');
     found.spheres = await findings(page);
     assert.deepEqual(found, Object.fromEntries(Object.keys(found).map((key) => [key, []])));
     await done();

@@ -148,6 +148,9 @@ export async function until(check, what, limit = Number(process.env.ORB_LIMIT ??
   }
 }
 
+/** Waits until the page has that many of what a locator finds. */
+export const counted = (locator, count, what) => until(async () => (await locator.count()) === count, what);
+
 export const button = (page, name, options) => page.getByRole('button', { name, ...options });
 
 /** Adds files and waits until they are uploaded and drawn. */
@@ -161,14 +164,7 @@ export async function addFiles(page, ...files) {
         .then((n) => n >= files.length),
     'the shapes are uploaded',
   );
-  await until(
-    () =>
-      page
-        .getByText('reading…')
-        .count()
-        .then((n) => n === 0),
-    'the shapes are read',
-  );
+  await counted(page.getByText('reading…'), 0, 'the shapes are read');
   await settled(page);
 }
 

@@ -4,7 +4,17 @@ import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readFile } from 'node:fs/promises';
 import { promisify } from 'node:util';
-import { addFiles, button, defaultShown, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
+import {
+  addFiles,
+  counted,
+  button,
+  defaultShown,
+  openPage,
+  sample,
+  startBrowser,
+  startDaemon,
+  until,
+} from './support.mjs';
 
 let daemon;
 let browser;
@@ -52,14 +62,7 @@ test('with a token everything works; the token stays in the tab and out of URLs'
   const addresses = [];
   page.on('request', (request) => addresses.push(request.url()));
   await enterToken(page, token['read,write']);
-  await until(
-    () =>
-      page
-        .getByRole('dialog')
-        .count()
-        .then((n) => n === 0),
-    'the dialog is gone',
-  );
+  await counted(page.getByRole('dialog'), 0, 'the dialog is gone');
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the morph plays');
@@ -90,14 +93,7 @@ test('with a token everything works; the token stays in the tab and out of URLs'
 test('a token that may only read gets an explanation', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await enterToken(page, token.read);
-  await until(
-    () =>
-      page
-        .getByRole('dialog')
-        .count()
-        .then((n) => n === 0),
-    'the dialog is gone',
-  );
+  await counted(page.getByRole('dialog'), 0, 'the dialog is gone');
   await page
     .locator('input[type=file]')
     .first()
@@ -105,14 +101,7 @@ test('a token that may only read gets an explanation', async () => {
   await page.getByText('The token lacks the scope “write”').waitFor();
   await button(page, 'Token', { exact: true }).click();
   await enterToken(page, token['read,write']);
-  await until(
-    () =>
-      page
-        .getByRole('dialog')
-        .count()
-        .then((n) => n === 0),
-    'another token is taken',
-  );
+  await counted(page.getByRole('dialog'), 0, 'another token is taken');
   await button(page, 'Try again').click();
   await page.locator('.card.ready').waitFor();
   await done();

@@ -6,7 +6,8 @@
 A unit is a source file together with the header of its name. An arrow runs from unit A to unit B where A includes B's
 header, or an object file of A uses a symbol that B defines (nm). In TypeScript and JavaScript an arrow is an import.
 --list prints the arrows between folders. Exit status 1: a circle or an upward arrow; each is printed with its cause.
-It also counts the entries of folders in MOST_ENTRIES. Standard library only; needs nm and git.
+It also counts the entries of folders in MOST_ENTRIES, and finds names of types in headers that name a second type.
+Standard library only; needs nm and git.
 """
 import collections
 import os
@@ -129,6 +130,19 @@ def circles(arrows):
     return found
 
 
+def named_twice(files):
+    """Types that a header defines and another file of core, api, server or client defines as well, with these files."""
+    places = collections.defaultdict(set)
+    for file in files:
+        text = (ROOT / file).read_text(encoding="utf-8")
+        for name in re.findall(r"^typedef (?:struct|enum|union)\b[^;{]*\{.*?^\} ?(\w+);", text, re.MULTILINE | re.DOTALL):
+            places[file.split("/")[0], name].add(file)
+        for name in re.findall(r"^(?:typedef )?(?:struct|enum|union) (\w+) \{", text, re.MULTILINE):
+            places[file.split("/")[0], name].add(file)
+    return {name: sorted(found) for (_, name), found in sorted(places.items())
+            if len(found) > 1 and any(file.endswith((".h", ".hh")) for file in found)}
+
+
 def level(name):
     """The place in ORDER of the unit or of the nearest folder around it; None: it has no place."""
     while name and name not in ORDER:
@@ -171,6 +185,9 @@ def main():
         if len(entries) > most:
             faults += 1
             print(f"{folder} has {len(entries)} entries, at most {most}: {' '.join(sorted(entries))}")
+    for name, files in named_twice(sources).items():
+        faults += 1
+        print(f"{name} names two types: {' '.join(files)}")
     if listing:
         folders = collections.defaultdict(set)
         for one in arrows:

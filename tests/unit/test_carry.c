@@ -1,4 +1,4 @@
-/* Carrying attributes: weights, spots of places, padding, baked colours; values from geometry. */
+/* Carrying attributes: weights, blends of corners, padding, baked colours; values from geometry. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -162,23 +162,23 @@ static void number_file(orb_context *ctx, orb_aligned_shape *shape) {
   }
 }
 
-/* A shape merged with itself: each corner's spot is its own vertex, and what is blended is what was given. */
-static void test_spots_of_itself(void **state) {
+/* A shape merged with itself: each corner's blend is its own vertex, and what is blended is what was given. */
+static void test_blends_of_itself(void **state) {
   orb_context *ctx = *state;
   synthetic made = synthetic_make(ctx, 2, 2, identity);
   const orb_mesh *mesh = &made.shapes[1].mesh;
-  orb_spot *spots;
+  orb_corner_blend *blends;
   number_file(ctx, &made.shapes[1]);
   float *values = ORB_NEW(ctx, float, mesh->vertex_count), *corners = ORB_NEW(ctx, float, 3 * mesh->triangle_count);
-  assert_int_equal(orb_spots_create(ctx, mesh, &made.shapes[1], mesh->triangles, &spots), ORB_OK);
+  assert_int_equal(orb_corner_blends_create(ctx, mesh, &made.shapes[1], mesh->triangles, &blends), ORB_OK);
   for (int32_t v = 0; v < mesh->vertex_count; v++) {
     values[v] = (float)mesh->positions[3 * v];
   }
-  orb_spots_blend(spots, 3 * mesh->triangle_count, values, 1, corners);
+  orb_corner_blends_apply(blends, 3 * mesh->triangle_count, values, 1, corners);
   for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
     assert_true(corners[h] == values[mesh->triangles[h]]);
   }
-  orb_free(ctx, spots);
+  orb_free(ctx, blends);
 
   /* Where one half of the triangles comes from a repair, it takes on what lies at its rim. */
   orb_mesh *changed = &made.shapes[1].mesh;
@@ -189,16 +189,16 @@ static void test_spots_of_itself(void **state) {
     }
     changed->source_triangle[t] = z > 0 ? ORB_MADE_FILL : t;
   }
-  assert_int_equal(orb_spots_create(ctx, mesh, &made.shapes[1], mesh->triangles, &spots), ORB_OK);
+  assert_int_equal(orb_corner_blends_create(ctx, mesh, &made.shapes[1], mesh->triangles, &blends), ORB_OK);
   for (int32_t v = 0; v < mesh->vertex_count; v++) {
     values[v] = mesh->positions[3 * v + 2] > -1e-9 ? 1 : 0;
   }
-  orb_spots_blend(spots, 3 * mesh->triangle_count, values, 1, corners);
+  orb_corner_blends_apply(blends, 3 * mesh->triangle_count, values, 1, corners);
   for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
-    assert_true(spots[h].weight[0] + spots[h].weight[1] + spots[h].weight[2] == 1);
+    assert_true(blends[h].weight[0] + blends[h].weight[1] + blends[h].weight[2] == 1);
     assert_true(corners[h] == values[mesh->triangles[h]]);
   }
-  orb_free(ctx, spots);
+  orb_free(ctx, blends);
   orb_free(ctx, values);
   orb_free(ctx, corners);
   orb_free(ctx, made.shapes[1].parent);
@@ -304,7 +304,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_sums_are_exact, setup, teardown),
       cmocka_unit_test_setup_teardown(test_padding, setup, teardown),
       cmocka_unit_test_setup_teardown(test_png, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_spots_of_itself, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_blends_of_itself, setup, teardown),
       cmocka_unit_test_setup_teardown(test_corners, setup, teardown),
       cmocka_unit_test_setup_teardown(test_bake, setup, teardown),
   };

@@ -459,7 +459,7 @@ export type Supermesh = {
     verdict: 'sure' | 'likely' | 'unsure';
     /** From 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs. */
     clear: number;
-    /** How many times as much as the best rough map the nearest other one bends the shapes, half of their rotations in space counted. About 1 where a shape looks alike from several sides, so that no match can be told from the others; such a match is never `sure`. */
+    /** The bend of the nearest other rough map, divided by that of the best one; half of the cost of their rotations in space is included. About 1 where a shape looks alike from several sides and no match stands out; such a match is never `sure`. */
     lead: number;
     /** How much the best rough map bends the shapes: 0 for a rigid motion. */
     bend: number;

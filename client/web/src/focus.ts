@@ -50,7 +50,7 @@ function check() {
 
 export function keepFocus() {
   document.addEventListener('focusin', ({ target }) => remember(target as HTMLElement));
-  // whoever clicks beside everything wants the focus nowhere
+  // a click beside everything removes the focus on purpose
   document.addEventListener('pointerdown', ({ target }) => {
     if (!(target as Element).closest?.(FOCUSABLE)) last = null;
   });

@@ -64,8 +64,8 @@ static orb_ks_edge edge_of(const orb_ks_ring *r, int32_t i, const double apex[3]
   return e;
 }
 
-KS_INLINE void spread(const float *s, const float *t, int32_t pairs, float draw, float radius, const float *apex,
-                      const orb_ks_edge *e, float *x, float *y, float *z) {
+KS_INLINE void spread_lanes(const float *s, const float *t, int32_t pairs, float draw, float radius, const float *apex,
+                            const orb_ks_edge *e, float *x, float *y, float *z) {
   float qx = draw * e->q[0], qy = draw * e->q[1], qz = draw * e->q[2];
   float wx = draw * e->w[0], wy = draw * e->w[1], wz = draw * e->w[2], ax = apex[0], ay = apex[1], az = apex[2];
   for (int32_t l = 0; l < pairs; l++) {
@@ -150,7 +150,7 @@ KS_INLINE float raised(float x, int kind) {
 }
 
 /* Raises each x to the power e; whole and half powers up to 64 by multiplication, bit by bit over all lanes. */
-KS_INLINE void raise_each(float *restrict x, float e) {
+KS_INLINE void raise_lanes(float *restrict x, float e) {
   float doubled = 2 * e, power[LANES];
   if (doubled != floorf(doubled) || doubled < 0 || doubled > 128) {
     for (int32_t l = 0; l < LANES; l++) {
@@ -191,9 +191,9 @@ KS_INLINE void measure(const orb_ks_edge *e, float quarter, float x, float y, fl
 }
 
 /* Adds the term of one ring triangle for exponents of 1, 3 or 12. */
-KS_INLINE void add_term(const orb_ks_edge *edge, int area_kind, int shape_kind, float shape_scale,
-                        const float *restrict x, const float *restrict y, const float *restrict z, int32_t count,
-                        float *restrict error) {
+KS_INLINE void add_term_lanes(const orb_ks_edge *edge, int area_kind, int shape_kind, float shape_scale,
+                              const float *restrict x, const float *restrict y, const float *restrict z, int32_t count,
+                              float *restrict error) {
   const orb_ks_edge e = *edge;
   float quarter = 0.25f * shape_scale;
   for (int32_t l = 0; l < count; l++) {
@@ -213,8 +213,8 @@ KS_INLINE void add_any_term(const orb_ks_edge *edge, float area_exponent, float 
     for (int32_t l = 0; l < LANES; l++) {
       measure(&e, quarter, x[begin + l], y[begin + l], z[begin + l], &angle[l], &area[l], &shape[l]);
     }
-    raise_each(area, area_exponent);
-    raise_each(shape, aspect_exponent);
+    raise_lanes(area, area_exponent);
+    raise_lanes(shape, aspect_exponent);
     for (int32_t l = 0; l < LANES; l++) {
       error[begin + l] += angle[l] * area[l] * shape[l];
     }
@@ -239,16 +239,16 @@ KS_INLINE void run(search *q, orb_cpu cpu) {
   float *x = q->x, *y = q->y, *z = q->z, *error = q->error;
   int32_t count = 0;
   for (int32_t i = 0; i < q->edges; i += q->stride, count += q->pairs) {
-    spread(q->s, q->t, q->pairs, q->draw, q->radius, q->apex, &q->edge[i], x + count, y + count, z + count);
+    spread_lanes(q->s, q->t, q->pairs, q->draw, q->radius, q->apex, &q->edge[i], x + count, y + count, z + count);
   }
   measure_depth(q->edge, q->edges, x, y, z, error, count);
   count = q->inside = keep_below(cpu, 0, x, y, z, error, count);
   memset(error, 0, (size_t)padded(count) * sizeof *error);
   for (int32_t i = 0; i < q->edges && count > 0; i++) {
     if (q->area_exponent == 3 && q->aspect_exponent == 12) {
-      add_term(&q->edge[i], 3, 12, q->shape_scale, x, y, z, padded(count), error);
+      add_term_lanes(&q->edge[i], 3, 12, q->shape_scale, x, y, z, padded(count), error);
     } else if (q->area_exponent == 3 && q->aspect_exponent == 1) {
-      add_term(&q->edge[i], 3, 1, q->shape_scale, x, y, z, padded(count), error);
+      add_term_lanes(&q->edge[i], 3, 1, q->shape_scale, x, y, z, padded(count), error);
     } else {
       add_any_term(&q->edge[i], q->area_exponent, q->aspect_exponent, q->shape_scale, x, y, z, padded(count), error);
     }

@@ -279,7 +279,7 @@ orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_s
   for (int32_t s = 0; s < job->shape_count; s++) {
     memcpy(out->places + (int64_t)s * now.vertex_count, now.places[s], (size_t)now.vertex_count * sizeof(orb_place));
     /* Every triangle lies in one triangle of the shape; only places and their positions are rounded, by a few units in
-     * the last place for each shape of the overlay. The term with the diagonal covers the rounding of those who measure
+     * the last place for each shape of the overlay. The term with the diagonal covers rounding when a caller measures
      * the distance. */
     out->error_bound[s] = now.moved[s] + 64 * 2.3e-16 * job->shape_count * largest_coordinate(&job->shapes[s].mesh) +
                           1e-13 * job->diagonal[s];

@@ -4,6 +4,7 @@
  */
 import { buildDisplay, type Display } from './geometry';
 import { parseMesh } from './parse';
+import { doubleArea, edges } from './triangle';
 
 export const MEASURES = ['symmetric_dirichlet', 'angle', 'area', 'aspect'] as const;
 export type MeasureName = (typeof MEASURES)[number];
@@ -42,25 +43,11 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
   return { surface, sphere, values: spread };
 }
 
-function area2(p: Float64Array, a: number, b: number, c: number): number {
-  const ux = p[b] - p[a];
-  const uy = p[b + 1] - p[a + 1];
-  const uz = p[b + 2] - p[a + 2];
-  const vx = p[c] - p[a];
-  const vy = p[c + 1] - p[a + 1];
-  const vz = p[c + 2] - p[a + 2];
-  return Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
-}
-
 /** The Gram matrix of the edges at the first corner: (uu, uv, vv). */
 function gram(p: Float64Array, a: number, b: number, c: number): [number, number, number] {
-  const ux = p[b] - p[a];
-  const uy = p[b + 1] - p[a + 1];
-  const uz = p[b + 2] - p[a + 2];
-  const vx = p[c] - p[a];
-  const vy = p[c + 1] - p[a + 1];
-  const vz = p[c + 2] - p[a + 2];
-  return [ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz];
+  const [u, v] = edges(p, a, b, c);
+  const dot = (x: number[], y: number[]) => x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+  return [dot(u, u), dot(u, v), dot(v, v)];
 }
 
 export interface TriangleDistortion {
@@ -82,9 +69,9 @@ export function triangleDistortion(x: Float64Array, image: Float64Array, corners
   let sumP = 0;
   for (let t = 0; t < n; t++) {
     const [a, b, c] = [3 * corners[3 * t], 3 * corners[3 * t + 1], 3 * corners[3 * t + 2]];
-    out.weight[t] = area2(x, a, b, c);
+    out.weight[t] = doubleArea(x, a, b, c);
     sumX += out.weight[t];
-    sumP += area2(image, a, b, c);
+    sumP += doubleArea(image, a, b, c);
   }
   const scale = sumX / sumP;
   for (let t = 0; t < n; t++) {

@@ -2,6 +2,7 @@
 import { Bvh } from './bvh';
 import type { RawMesh } from './parse';
 import { faceNormal, pointOf } from './surface';
+import { doubleArea } from './triangle';
 
 /**
  * Undoes the similarity that the asset has applied to a shape. It finds the least-squares similarity between the two
@@ -115,13 +116,7 @@ function moments(p: ArrayLike<number>, corners: Uint32Array) {
   for (const pass of [0, 1])
     for (let t = 0; t < corners.length; t += 3) {
       const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
-      const ux = p[b] - p[a];
-      const uy = p[b + 1] - p[a + 1];
-      const uz = p[b + 2] - p[a + 2];
-      const vx = p[c] - p[a];
-      const vy = p[c + 1] - p[a + 1];
-      const vz = p[c + 2] - p[a + 2];
-      const w = Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
+      const w = doubleArea(p, a, b, c);
       const m = [0, 1, 2].map((k) => (p[a + k] + p[b + k] + p[c + k]) / 3);
       if (pass === 0) {
         area += w;

@@ -1,6 +1,7 @@
 /** Turns a parsed mesh into what the GPU draws: scaled to the unit ball, with smooth normals, creases and edges. */
 import { splitByLook, type Skin } from './dress';
 import type { RawMesh } from './parse';
+import { areaNormal } from './triangle';
 
 export interface Frame {
   center: [number, number, number];
@@ -198,15 +199,7 @@ export function smoothNormals(position: Float32Array, index: Uint32Array): Float
     const a = 3 * index[t];
     const b = 3 * index[t + 1];
     const c = 3 * index[t + 2];
-    const ux = position[b] - position[a];
-    const uy = position[b + 1] - position[a + 1];
-    const uz = position[b + 2] - position[a + 2];
-    const vx = position[c] - position[a];
-    const vy = position[c + 1] - position[a + 1];
-    const vz = position[c + 2] - position[a + 2];
-    const nx = uy * vz - uz * vy;
-    const ny = uz * vx - ux * vz;
-    const nz = ux * vy - uy * vx;
+    const [nx, ny, nz] = areaNormal(position, a, b, c);
     for (const v of [a, b, c]) {
       normal[v] += nx;
       normal[v + 1] += ny;

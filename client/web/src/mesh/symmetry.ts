@@ -4,6 +4,7 @@
  */
 import type { Bvh } from './bvh';
 import type { RawMesh } from './parse';
+import { doubleArea } from './triangle';
 
 export interface Plane {
   /** unit vector; the plane is where dot(normal, x) = offset */
@@ -61,12 +62,8 @@ function samples({ positions: p, corners }: RawMesh): number[][] {
   const faces = corners.length / 3;
   const total = new Float64Array(faces + 1);
   const corner = (t: number, c: number) => [0, 1, 2].map((k) => p[3 * corners[3 * t + c] + k]);
-  for (let t = 0; t < faces; t++) {
-    const [a, b, c] = [corner(t, 0), corner(t, 1), corner(t, 2)];
-    const [u, w] = [b.map((x, k) => x - a[k]), c.map((x, k) => x - a[k])];
-    total[t + 1] =
-      total[t] + Math.hypot(u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]);
-  }
+  for (let t = 0; t < faces; t++)
+    total[t + 1] = total[t] + doubleArea(p, 3 * corners[3 * t], 3 * corners[3 * t + 1], 3 * corners[3 * t + 2]);
   const out: number[][] = [];
   for (let i = 0, t = 0; i < SAMPLES; i++) {
     const at = ((i + 0.5) / SAMPLES) * total[faces];

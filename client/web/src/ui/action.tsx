@@ -75,7 +75,7 @@ function Progress({ running }: { running: Running }) {
   const seconds = Math.floor(Math.max(0, now - begun.current) / 1000);
   const clock = `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, '0')}`;
   return (
-    // not its Cancel button: whoever holds Enter on “Morph” a moment too long would cancel the morph
+    // not its Cancel button: holding Enter on “Morph” a moment too long would cancel the morph
     <div class="progress" role="group" aria-label="Progress" tabIndex={-1} data-takes-focus>
       <div class="progress-text">
         <span role="status">{text}</span>

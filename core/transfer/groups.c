@@ -1,4 +1,4 @@
-#include "transfer/coarse.h"
+#include "transfer/groups.h"
 
 #include <math.h>
 #include <string.h>
@@ -16,21 +16,21 @@ static const double REGULAR = 1e-8, ALONE = 1e-12;
 /* Square of a pivot: keeps its inverse finite where rounding leaves nothing. */
 static const double LEAST_PIVOT = 1e-300;
 
-void orb_coarse_free(orb_context *ctx, orb_coarse *coarse) {
-  orb_free(ctx, coarse->group);
-  orb_free(ctx, coarse->factor);
-  orb_free(ctx, coarse->sums);
-  memset(coarse, 0, sizeof *coarse);
+void orb_groups_free(orb_context *ctx, orb_groups *groups) {
+  orb_free(ctx, groups->group);
+  orb_free(ctx, groups->factor);
+  orb_free(ctx, groups->sums);
+  memset(groups, 0, sizeof *groups);
 }
 
 /* Grows groups of `size` vertices, breadth first; smaller pieces join a neighbouring group. */
-static void make_groups(orb_coarse *coarse, const int32_t *first, const int32_t *neighbor, int32_t size,
+static void make_groups(orb_groups *groups, const int32_t *first, const int32_t *neighbor, int32_t size,
                         int32_t *queue) {
-  int32_t *group = coarse->group, count = 0;
-  for (int32_t v = 0; v < coarse->vertex_count; v++) {
+  int32_t *group = groups->group, count = 0;
+  for (int32_t v = 0; v < groups->vertex_count; v++) {
     group[v] = -1;
   }
-  for (int32_t seed = 0; seed < coarse->vertex_count; seed++) {
+  for (int32_t seed = 0; seed < groups->vertex_count; seed++) {
     if (group[seed] >= 0) {
       continue;
     }
@@ -57,7 +57,7 @@ static void make_groups(orb_coarse *coarse, const int32_t *first, const int32_t 
       count++;
     }
   }
-  coarse->group_count = count;
+  groups->group_count = count;
 }
 
 static double dot(const double *a, const double *b, int32_t n) {
@@ -89,8 +89,8 @@ static orb_status factorise(orb_context *ctx, double *m, int32_t n) {
   return ORB_OK;
 }
 
-orb_status orb_coarse_create(orb_context *ctx, const int32_t *first, const int32_t *neighbor, const double *weight,
-                             int32_t vertex_count, orb_coarse *out) {
+orb_status orb_groups_create(orb_context *ctx, const int32_t *first, const int32_t *neighbor, const double *weight,
+                             int32_t vertex_count, orb_groups *out) {
   memset(out, 0, sizeof *out);
   out->vertex_count = vertex_count;
   out->group = ORB_NEW(ctx, int32_t, vertex_count);
@@ -125,23 +125,23 @@ orb_status orb_coarse_create(orb_context *ctx, const int32_t *first, const int32
   }
   orb_free(ctx, queue);
   if (status != ORB_OK) {
-    orb_coarse_free(ctx, out);
+    orb_groups_free(ctx, out);
   }
   return status;
 }
 
-void orb_coarse_solve(orb_coarse *coarse, const double *r) {
-  int32_t n = coarse->group_count;
-  double *x = coarse->sums;
+void orb_groups_solve(orb_groups *groups, const double *r) {
+  int32_t n = groups->group_count;
+  double *x = groups->sums;
   memset(x, 0, 3 * (size_t)n * sizeof *x);
-  for (int64_t v = 0; v < coarse->vertex_count; v++) {
-    double *sum = x + 3 * (int64_t)coarse->group[v];
+  for (int64_t v = 0; v < groups->vertex_count; v++) {
+    double *sum = x + 3 * (int64_t)groups->group[v];
     sum[0] += r[3 * v];
     sum[1] += r[3 * v + 1];
     sum[2] += r[3 * v + 2];
   }
   for (int64_t i = 0; i < n; i++) { /* L y = sums, then Lᵀ x = y: both by rows of L */
-    const double *row = coarse->factor + i * n;
+    const double *row = groups->factor + i * n;
     for (int64_t j = 0; j < i; j++) {
       for (int c = 0; c < 3; c++) {
         x[3 * i + c] -= row[j] * x[3 * j + c];
@@ -152,7 +152,7 @@ void orb_coarse_solve(orb_coarse *coarse, const double *r) {
     }
   }
   for (int64_t i = n - 1; i >= 0; i--) {
-    const double *row = coarse->factor + i * n;
+    const double *row = groups->factor + i * n;
     for (int c = 0; c < 3; c++) {
       x[3 * i + c] /= row[i];
     }

@@ -1,4 +1,4 @@
-#include "carry/spots.h"
+#include "carry/corner_blend.h"
 
 #include <string.h>
 
@@ -8,8 +8,8 @@
 
 enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
 
-static int make_spot(const orb_mesh *given, const orb_aligned_shape *shape, const int32_t *corners, int64_t h,
-                     orb_spot *out) {
+static int make_blend(const orb_mesh *given, const orb_aligned_shape *shape, const int32_t *corners, int64_t h,
+                      orb_corner_blend *out) {
   orb_place place = {.triangle = (int32_t)(h / 3)}, before, file;
   place.at[h % 3] = 1;
   orb_place_before(given, shape, &place, &before);
@@ -24,15 +24,15 @@ static int make_spot(const orb_mesh *given, const orb_aligned_shape *shape, cons
   return 1;
 }
 
-/* Gives corners without a spot that of a neighbour, ring by ring. known: per vertex a corner with a spot, or −1. */
+/* Gives corners without a blend that of a neighbour, ring by ring. known: per vertex a corner with a blend, or −1. */
 static orb_status spread(orb_context *ctx, const orb_mesh *mesh, int64_t *known, int64_t *open, int64_t count,
-                         orb_spot *spots) {
+                         orb_corner_blend *blends) {
   while (count > 0) {
     int64_t left = 0;
     for (int64_t i = 0; i < count; i++) {
       int64_t h = open[i], from = known[mesh->triangles[h]];
       if (from >= 0) {
-        spots[h] = spots[from];
+        blends[h] = blends[from];
       } else {
         open[left++] = h;
       }
@@ -45,7 +45,7 @@ static orb_status spread(orb_context *ctx, const orb_mesh *mesh, int64_t *known,
       int32_t h = (int32_t)open[i], next = mesh->triangles[orb_next(h)], last = mesh->triangles[orb_prev(h)];
       int64_t from = known[next] >= 0 ? known[next] : known[last];
       if (from >= 0) {
-        spots[h] = spots[from];
+        blends[h] = blends[from];
         reached++;
       }
       open[i] = from >= 0 ? -1 - (int64_t)h : (int64_t)h;
@@ -65,19 +65,19 @@ static orb_status spread(orb_context *ctx, const orb_mesh *mesh, int64_t *known,
   return ORB_OK;
 }
 
-orb_status orb_spots_create(orb_context *ctx, const orb_mesh *given, const orb_aligned_shape *shape,
-                            const int32_t *corners, orb_spot **out) {
+orb_status orb_corner_blends_create(orb_context *ctx, const orb_mesh *given, const orb_aligned_shape *shape,
+                                    const int32_t *corners, orb_corner_blend **out) {
   const orb_mesh *mesh = &shape->mesh;
   int64_t count = 3 * (int64_t)mesh->triangle_count, open_count = 0;
-  orb_spot *spots = ORB_NEW0(ctx, orb_spot, count);
+  orb_corner_blend *blends = ORB_NEW0(ctx, orb_corner_blend, count);
   int64_t *known = ORB_NEW(ctx, int64_t, mesh->vertex_count), *open = ORB_NEW(ctx, int64_t, count);
-  orb_status status = spots && known && open ? ORB_OK : ORB_E_NO_MEMORY;
-  *out = spots;
+  orb_status status = blends && known && open ? ORB_OK : ORB_E_NO_MEMORY;
+  *out = blends;
   for (int32_t v = 0; status == ORB_OK && v < mesh->vertex_count; v++) {
     known[v] = -1;
   }
   for (int64_t h = 0; status == ORB_OK && h < count; h++) {
-    if (make_spot(given, shape, corners, h, &spots[h])) {
+    if (make_blend(given, shape, corners, h, &blends[h])) {
       int64_t *first = &known[mesh->triangles[h]];
       *first = *first < 0 ? h : *first;
     } else {
@@ -86,24 +86,25 @@ orb_status orb_spots_create(orb_context *ctx, const orb_mesh *given, const orb_a
     status = h % CHECK_EVERY == 0 ? orb_context_check(ctx) : ORB_OK;
   }
   if (status == ORB_OK) {
-    status = spread(ctx, mesh, known, open, open_count, spots);
+    status = spread(ctx, mesh, known, open, open_count, blends);
   }
   orb_free(ctx, known);
   orb_free(ctx, open);
   if (status != ORB_OK) {
-    orb_free(ctx, spots);
+    orb_free(ctx, blends);
     *out = NULL;
   }
   return status;
 }
 
-void orb_spots_blend(const orb_spot *spots, int64_t count, const float *values, int32_t width, float *out) {
+void orb_corner_blends_apply(const orb_corner_blend *blends, int64_t count, const float *values, int32_t width,
+                             float *out) {
   for (int64_t h = 0; h < count; h++) {
     for (int32_t c = 0; c < width; c++) {
       double sum = 0;
       for (int k = 0; k < 3; k++) {
-        if (spots[h].weight[k] > 0) {
-          sum += spots[h].weight[k] * (double)values[width * (int64_t)spots[h].vertex[k] + c];
+        if (blends[h].weight[k] > 0) {
+          sum += blends[h].weight[k] * (double)values[width * (int64_t)blends[h].vertex[k] + c];
         }
       }
       out[width * h + c] = (float)sum;
