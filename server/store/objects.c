@@ -308,6 +308,10 @@ int objects_is_near(const objects *store, object_kind kind, const char *id) {
   return !store->vault || vault_copy(store->vault, name);
 }
 
+int objects_are_remote(const objects *store) {
+  return store->vault != NULL;
+}
+
 int objects_are_away(const objects *store) {
   return store->vault && vault_is_away(store->vault);
 }

@@ -77,7 +77,8 @@ store_result objects_load(const objects *store, object_kind kind, const char *id
 store_result objects_look(const objects *store, object_kind kind, const char *id);
 /* Whether reading an object asks no other machine now. */
 int objects_is_near(const objects *store, object_kind kind, const char *id);
-/* Whether objects are in a bucket that does not answer. */
+/* Whether objects are in a bucket, and whether that does not answer. */
+int objects_are_remote(const objects *store);
 int objects_are_away(const objects *store);
 /* A URL from which anyone may read an object for so many seconds; more: see s3_presign(). 0: there is none. */
 int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
