@@ -246,6 +246,7 @@ static int quarantine_inputs(const run_env *env, const collected *all) {
       continue;
     }
     verify_again(env->store, all->heads[i].object, all->heads[i].id, all->heads[i].sha);
+    objects_settle(env->store); /* the scrub may have moved it */
     gone |= all->heads[i].object == OBJECT_SPHERE &&
             catalogue_get(env->cat, RESOURCE_EMBEDDING, all->heads[i].id, &row) == STORE_NOT_FOUND;
     resource_free(&row);
