@@ -88,8 +88,9 @@ int target_headers_refused(const char *number, struct MHD_Connection *connection
   if (info->header_size + all.bytes + ANSWER <= TARGET_MEMORY) {
     return 0;
   }
-  api_refuse(&problem, "headers-too-large", "The headers have %zu bytes and %zu lines, cookies and parameters; shorten them.",
-             info->header_size, all.records);
+  api_refuse(&problem, "headers-too-large",
+             "The headers have %zu bytes and %zu lines, cookies and parameters; shorten them.", info->header_size,
+             all.records);
   refuse(connection, number, "431 Request Header Fields Too Large", &problem);
   return 1;
 }

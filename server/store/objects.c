@@ -40,8 +40,8 @@ struct objects {
   held_object *held;
   marks *verified;
   char root[PATH_MAX - 256];
-  objects_remote remote; /* publish NULL: the store has files */
-  vault *vault;          /* NULL: the objects are files */
+  objects_remote remote;    /* publish NULL: the store has files */
+  vault *vault;             /* NULL: the objects are files */
   pthread_rwlock_t healing; /* shared from a move to quarantine until the result that had the object is deleted */
   void (*heal)(void *user, object_kind kind, const char *id);
   void *heal_user;
