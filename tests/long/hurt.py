@@ -5,9 +5,10 @@
                            bus    reads across a word while alignment is checked
                            loop   runs one instruction for ever
                            exit   ends with status 3
-                           oom    needs memory that its control group (cgroup v1 or v2) does not have; the kernel kills it
+                           oom    needs memory that its control group does not have, so the kernel kills it
 
-Needs root, x86-64 Linux. Exit status 0: done; 1: the process has ended, or could not be hurt in this way.
+Needs root, Linux on x86-64 and, for oom, the memory controller of cgroup v1. Exit status 0: done; 1: the process has ended
+meanwhile, or asked for no more memory; 2: this cannot be done here.
 """
 import ctypes
 import os
@@ -41,7 +42,8 @@ def code_of(way):
         return bytes.fromhex("ebfe"), {}  # jmp to itself
     if way == "exit":
         return bytes.fromhex("0f05"), {"rax": 231, "rdi": 3}  # exit_group(3)
-    raise SystemExit(__doc__)
+    print(__doc__, file=sys.stderr)
+    sys.exit(2)
 
 
 def poison(pid, way):
@@ -61,7 +63,11 @@ def poison(pid, way):
 
 def starve(pid):
     """A control group with less memory than the process needs for its next pages."""
-    here = next(line.split(":")[2].strip() for line in open("/proc/self/cgroup") if ":memory:" in line)
+    groups = [line.split(":")[2].strip() for line in open("/proc/self/cgroup") if ":memory:" in line]
+    if not groups:
+        print("there is no memory controller of cgroup v1", file=sys.stderr)
+        sys.exit(2)
+    here = groups[0]
     group = f"/sys/fs/cgroup/memory{here}/orbmorph-starve-{pid}"
     os.mkdir(group)
     try:
