@@ -6,10 +6,11 @@
 // or loops for ever, until its time limit (tests/long/hurt.py changes its next instruction); the kernel kills it because its
 // control group has no memory; it gets SIGKILL. Needs root.
 import assert from 'node:assert/strict';
-import { execFile } from 'node:child_process';
+import { spawn } from 'node:child_process';
 import { mkdtemp, rm } from 'node:fs/promises';
 import os from 'node:os';
 import path from 'node:path';
+import readline from 'node:readline';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { Daemon } from '../scenario/support/daemon.mjs';
 import { workers } from '../scenario/support/processes.mjs';
@@ -30,15 +31,15 @@ d.child.stderr.on('data', (chunk) => (log += chunk));
 
 const ways = ['segv', 'bus', 'SIGKILL', 'oom', 'loop', 'exit'];
 const died = Object.fromEntries(ways.map((way) => [way, 0]));
+const hurt = spawn('python3', [new URL('hurt.py', import.meta.url).pathname], { stdio: ['pipe', 'pipe', 'ignore'] });
+const answers = readline.createInterface({ input: hurt.stdout })[Symbol.asyncIterator]();
 /** Makes a process die, or loop for ever; false if it has ended meanwhile. */
 async function kill(pid, way) {
   if (way !== 'SIGKILL') {
-    const args = [new URL('hurt.py', import.meta.url).pathname, String(pid), way];
-    const { code, said } = await new Promise((resolve) =>
-      execFile('python3', args, (error, _, said) => resolve({ code: error?.code ?? 0, said })),
-    );
-    assert.ok(code === 0 || code === 1, said);
-    return code === 0;
+    hurt.stdin.write(`${pid} ${way}\n`);
+    const { value, done } = await answers.next();
+    assert.ok(!done, 'hurt.py ended');
+    return value === '0';
   }
   try {
     return process.kill(pid, way);
@@ -86,6 +87,7 @@ for (let n = 0; n < deaths; ) {
   assert.ok(Date.now() - began < 3_600_000, `only ${n} deaths within an hour`);
 }
 stop = true;
+hurt.stdin.end();
 await Promise.all(busy);
 
 // Each death takes at most one attempt of one job, or one upload.

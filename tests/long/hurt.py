@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Makes a process die, or never end, by what it does itself: its next instruction is replaced (ptrace).
+"""Makes processes die, or never end, by what they do themselves: their next instruction is replaced (ptrace).
 
-  hurt.py PID WAY     WAY: segv   reads from address 0
-                           bus    reads across a word while alignment is checked
-                           loop   runs one instruction for ever
-                           exit   ends with status 3
-                           oom    needs memory that its control group does not have, so the kernel kills it
+  hurt.py      reads lines "PID WAY" and answers each with a line: 0 done, 1 the process has ended meanwhile
 
-Needs root, Linux on x86-64 and, for oom, the memory controller of cgroup v1. Exit status 0: done; 1: the process has ended
-meanwhile, or asked for no more memory; 2: this cannot be done here.
+  segv   it reads from address 0
+  bus    it reads across a word while alignment is checked
+  loop   it runs one instruction for ever
+  exit   it ends with status 3
+  oom    it fills its stack in a control group that has no memory for that, so the kernel kills it
+
+Needs root, Linux on x86-64 and, for oom, the memory controller of cgroup v1. One hurt.py serves many lines, since
+the process of a small job is gone before Python starts.
 """
 import ctypes
 import os
@@ -32,77 +34,68 @@ def ptrace(what, pid, address=0, data=0):
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
 
 
-def code_of(way):
-    """What the process runs next, and the registers that this needs."""
-    if way == "segv":
-        return bytes.fromhex("488b00"), {"rax": 0}  # mov rax, [rax]
-    if way == "bus":
-        return bytes.fromhex("488b442401"), {"eflags": 0x40000}  # AC; mov rax, [rsp + 1]
-    if way == "loop":
-        return bytes.fromhex("ebfe"), {}  # jmp to itself
-    if way == "exit":
-        return bytes.fromhex("0f05"), {"rax": 231, "rdi": 3}  # exit_group(3)
-    print(__doc__, file=sys.stderr)
-    sys.exit(2)
+# What the process runs next, and the registers that this needs.
+WAYS = {
+    "segv": ("488b00", {"rax": 0}),  # mov rax, [rax]
+    "bus": ("488b442401", {"eflags": 0x40000}),  # AC; mov rax, [rsp + 1]
+    "loop": ("ebfe", {}),  # jmp to itself
+    "exit": ("0f05", {"rax": 231, "rdi": 3}),  # exit_group(3)
+    "oom": ("50ebfd", {}),  # push rax; jmp to that
+}
 
 
 def poison(pid, way):
-    code, registers = code_of(way)
-    ptrace(SEIZE, pid)
-    ptrace(INTERRUPT, pid)
-    os.waitpid(pid, 0x40000000)  # __WALL
+    """Of a process that is stopped."""
+    code, registers = WAYS[way]
     now = Registers()
     ptrace(GETREGS, pid, 0, ctypes.addressof(now))
     for name, value in registers.items():
         setattr(now, name, value | (now.eflags if name == "eflags" else 0))
     now.orig_rax = 2**64 - 1  # a system call that was interrupted is not begun again
     ptrace(SETREGS, pid, 0, ctypes.addressof(now))
-    ptrace(POKETEXT, pid, now.rip, int.from_bytes(code.ljust(8, b"\x90"), "little"))
-    ptrace(DETACH, pid)
+    ptrace(POKETEXT, pid, now.rip, int.from_bytes(bytes.fromhex(code).ljust(8, b"\x90"), "little"))
 
 
-def starve(pid):
-    """A control group with less memory than the process needs for its next pages."""
-    groups = [line.split(":")[2].strip() for line in open("/proc/self/cgroup") if ":memory:" in line]
-    if not groups:
-        print("there is no memory controller of cgroup v1", file=sys.stderr)
-        sys.exit(2)
-    here = groups[0]
+def group_of(pid):
+    """A control group with hardly any memory, which the process joins."""
+    here = next(line.split(":")[2].strip() for line in open("/proc/self/cgroup") if ":memory:" in line)
     group = f"/sys/fs/cgroup/memory{here}/orbmorph-starve-{pid}"
     os.mkdir(group)
-    try:
-        with open(f"{group}/memory.limit_in_bytes", "w") as limit:
-            limit.write("65536")
-        with open(f"{group}/cgroup.procs", "w") as processes:
-            processes.write(str(pid))
-        for _ in range(1000):
-            if "oom_kill 1" in open(f"{group}/memory.oom_control").read():
-                return True
-            if not os.path.exists(f"/proc/{pid}"):
-                return False
-            time.sleep(0.005)
-        with open(f"/sys/fs/cgroup/memory{here}/cgroup.procs", "w") as processes:
-            processes.write(str(pid))
-        return False
-    finally:
-        for _ in range(200):
-            try:
-                os.rmdir(group)
-                break
-            except OSError:
-                time.sleep(0.01)
+    for name, value in (("memory.limit_in_bytes", "65536"), ("cgroup.procs", str(pid))):
+        with open(f"{group}/{name}", "w") as file:
+            file.write(value)
+    return group
 
 
-def main():
-    pid, way = int(sys.argv[1]), sys.argv[2]
+def leave(group):
+    """Once the process has ended."""
+    for _ in range(500):
+        try:
+            os.rmdir(group)
+            return
+        except OSError:
+            time.sleep(0.01)
+
+
+def hurt(pid, way):
+    group = None
     try:
+        ptrace(SEIZE, pid)
+        ptrace(INTERRUPT, pid)
+        os.waitpid(pid, 0x40000000)  # __WALL
         if way == "oom":
-            return 0 if starve(pid) else 1
+            group = group_of(pid)
         poison(pid, way)
-        return 0
+        ptrace(DETACH, pid)
+        return True
     except (OSError, ChildProcessError) as error:
         print(f"{way} of {pid}: {error}", file=sys.stderr)
-        return 1
+        return False
+    finally:
+        if group:
+            leave(group)
 
 
-sys.exit(main())
+for line in sys.stdin:
+    number, name = line.split()
+    print(0 if hurt(int(number), name) else 1, flush=True)
