@@ -513,10 +513,8 @@ static int run(const command_line *line) {
   const config *options = line->options;
   server srv = {.options = options, .at = {.fd = -1}};
   sigset_t set;
-  struct timespec now;
   int signals = take_signals(&set);
-  clock_gettime(CLOCK_REALTIME, &now);
-  srv.started = now.tv_sec;
+  srv.started_ms = orb_clock_ms();
   raise_descriptor_limit();
   int lock = signals < 0 ? -1 : lock_data(options->data);
   if (signals >= 0 && lock < 0) {

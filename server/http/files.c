@@ -60,10 +60,9 @@ static int file_of(request *r, const cached *entry) {
   return done;
 }
 
-/* Whether an object is missing that must exist as long as its row does. Supermeshes of older engines may have no
- * places and no spheres. */
+/* The row was there, and its object is not. */
 static int is_lost(const request *r) {
-  return r->status == 404 && r->route->id != ROUTE_SUPERMESH_PLACES && r->route->id != ROUTE_SUPERMESH_SPHERE;
+  return r->status == 404;
 }
 
 static void file_away(request *r) {

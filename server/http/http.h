@@ -73,7 +73,7 @@ typedef struct server {
   struct MHD_Daemon *daemon;
   int ready, stopping; /* written under __atomic */
   int64_t decoding;    /* bytes held by the decoders of bodies; __atomic */
-  int64_t started;
+  int64_t started_ms;  /* orb_clock_ms() */
   int needs_token;
   int works_only; /* the role work: answers only what is about the node itself */
   int unfit;      /* the catalogue refused to open: see STORE_UNFIT */

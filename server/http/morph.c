@@ -205,6 +205,7 @@ static int failed_before(request *r, const wanted_result *wish) {
 
 static int is_deleted(const request *r, const char *id) {
   resource row = {0};
+  objects_settle(r->srv->store);
   store_result found = catalogue_get(r->srv->cat, RESOURCE_SUPERMESH, id, &row);
   resource_free(&row);
   return found == STORE_NOT_FOUND;

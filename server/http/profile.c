@@ -67,6 +67,7 @@ static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *p
   resource_free(&row);
   found = found == STORE_OK ? objects_read(r->srv->store, OBJECT_ASSET, r->id, &fd, &size) : found;
   if (found != STORE_OK) {
+    objects_settle(r->srv->store);
     int gone = found == STORE_NOT_FOUND && !evict_is_named(r->srv->cat, OBJECT_ASSET, r->id);
     return api_refuse(problem, gone ? "not-found" : "internal", "%s",
                       gone

@@ -186,7 +186,7 @@ static enum MHD_Result ready(request *r) {
     api_json_member_integer(&json, "max_connections", srv->options->max_connections);
     api_json_member_integer(&json, "waiting_connections", n.waiters);
     api_json_member_integer(&json, "disk_free_bytes", (int64_t)objects_free_bytes(srv->store));
-    api_json_member_integer(&json, "uptime_seconds", (int64_t)time(NULL) - srv->started);
+    api_json_member_integer(&json, "uptime_seconds", (orb_clock_ms() - srv->started_ms) / 1000);
     api_json_member_string(&json, "engine", ORB_ENGINE);
     api_json_member_bool(&json, "read_only", objects_is_read_only(srv->store));
     write_integrity(&found, &json);

@@ -33,6 +33,7 @@ typedef struct isolated {
   orb_context *ctx;           /* of the job: its cancel flag and deadline end the process */
   int (*wanted)(void *user);  /* 0: cancel the context; NULL: nobody is asked */
   void *user;
+  int64_t last_ms; /* orb_clock_ms() beyond which nothing is waited for; 0: the context decides alone */
 } isolated;
 
 /* Forks a process; 0 with the reason logged. Starts a new zygote if it has died. Blocks for about a millisecond. */

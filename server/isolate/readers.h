@@ -14,7 +14,7 @@
 
 enum {
   READER_BYTES = 1 << 20, /* larger files take so long that a process of their own adds little */
-  READER_FILES = 100,     /* a process adds a hundredth of its cost to each */
+  READER_FILES = 500,     /* a process adds a five-hundredth of its cost to each */
   READER_WORK_MS = 1000   /* beside the limit of a single check on processor time */
 };
 

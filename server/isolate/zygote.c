@@ -390,7 +390,7 @@ static int continues(void *user) {
   if (p->wanted && !p->wanted(p->user)) {
     orb_context_cancel(p->ctx);
   }
-  return orb_context_check(p->ctx) == ORB_OK;
+  return orb_context_check(p->ctx) == ORB_OK && (!p->last_ms || orb_clock_ms() < p->last_ms);
 }
 
 channel_result isolate_send(isolated *p, frame_type type, const struct iovec *parts, int count, int passed) {

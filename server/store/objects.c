@@ -40,8 +40,9 @@ struct objects {
   held_object *held;
   marks *verified;
   char root[PATH_MAX - 256];
-  objects_remote remote; /* publish NULL: the store has files */
-  vault *vault;          /* NULL: the objects are files */
+  objects_remote remote;    /* publish NULL: the store has files */
+  vault *vault;             /* NULL: the objects are files */
+  pthread_rwlock_t healing; /* shared from a move to quarantine until the result that had the object is deleted */
   void (*heal)(void *user, object_kind kind, const char *id);
   void *heal_user;
 };
@@ -88,6 +89,7 @@ static objects *create(const char *data) {
   pthread_rwlockattr_init(&attributes);
   pthread_rwlockattr_setkind_np(&attributes, PTHREAD_RWLOCK_PREFER_WRITER_NONRECURSIVE_NP);
   pthread_rwlock_init(&store->publishing, &attributes);
+  pthread_rwlock_init(&store->healing, NULL);
   pthread_rwlockattr_destroy(&attributes);
   pthread_mutex_init(&store->deleting, NULL);
   store->backup_lock = -1;
@@ -165,6 +167,7 @@ void objects_close(objects *store) {
   marks_destroy(store->verified);
   pthread_mutex_destroy(&store->deleting);
   pthread_rwlock_destroy(&store->publishing);
+  pthread_rwlock_destroy(&store->healing);
   object_lock_close(store->nodes);
   free(store);
 }
@@ -429,6 +432,7 @@ int objects_hold_backups(objects *store) {
 /* Makes again what vault_read() found damaged, perhaps in a thread that held the store. */
 static void heal_damaged(objects *store) {
   char name[VAULT_NAME];
+  pthread_rwlock_rdlock(&store->healing);
   while (store->vault && vault_take_damaged(store->vault, name)) {
     object_kind kind;
     const char *id;
@@ -442,6 +446,13 @@ static void heal_damaged(objects *store) {
       store->heal(store->heal_user, kind, id);
     }
   }
+  pthread_rwlock_unlock(&store->healing);
+}
+
+void objects_settle(objects *store) {
+  heal_damaged(store);
+  pthread_rwlock_wrlock(&store->healing);
+  pthread_rwlock_unlock(&store->healing);
 }
 
 static held_object *take_held(objects *store) {
@@ -501,6 +512,7 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
   int moved = 0;
   size_t n = strlen(aside);
   snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", object_folder(kind), id, (long long)time(NULL));
+  pthread_rwlock_rdlock(&store->healing);
   if (result == STORE_OK && store->vault) {
     char name[OBJECT_NAME];
     objects_name(kind, id, name);
@@ -523,6 +535,7 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
       store->heal(store->heal_user, kind, id);
     }
   }
+  pthread_rwlock_unlock(&store->healing);
   return result;
 }
 

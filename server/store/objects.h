@@ -121,6 +121,9 @@ int objects_is_marked(const objects *store, object_kind kind, const char *id);
 store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd);
 /* `heal` is called after each object that was moved to quarantine, on the thread that found it, which holds no lock. */
 void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user);
+/* Waits until `heal` has returned for every object that is in quarantine now. Whoever finds a row without its object
+ * calls this and looks at the row again: a thread may be about to delete it. Blocks; not within `heal`. */
+void objects_settle(objects *store);
 
 /* Whether the file system is mounted read-only, as the kernel does after errors of the disk. */
 int objects_is_read_only(const objects *store);

@@ -17,6 +17,9 @@
 
 enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, COPY_BYTES = 16 << 20 };
 
+/* Asset, places and spheres. */
+enum { OBJECTS_MOST = 3 };
+
 typedef struct collected {
   input_head heads[INPUTS_MOST];
   char *json[INPUTS_MOST];
@@ -209,20 +212,23 @@ static void take_progress(const run_env *env, const frame *f) {
 
 /* Takes frames until the end: as take_done(), or −1 with the result of the channel. */
 static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j,
-                     const char *alignment, run_output *out, api_problem *problem, channel_result *why) {
+                     const char *alignment, int64_t hold_ms, run_output *out, api_problem *problem,
+                     channel_result *why) {
   frame f;
+  int count = 0;
   for (int taken = 1;;) {
     *why = isolate_receive(p, CHANNEL_MOST, &f);
     if (*why != CHANNEL_OK) {
       return -1;
     }
-    if (f.type == FRAME_PROGRESS) {
+    if (f.type == FRAME_PROGRESS && !out->holds) {
       take_progress(env, &f);
     } else if (f.type == FRAME_OBJECT) {
-      taken = take_object(env, ctx, kind, j, alignment, &f, out, problem);
+      taken = out->holds && ++count >= OBJECTS_MOST ? -1 : take_object(env, ctx, kind, j, alignment, &f, out, problem);
+      p->last_ms = out->holds ? orb_clock_ms() + hold_ms : 0;
     } else if (f.type == FRAME_DONE) {
       taken = take_done(j, kind, &f, out, problem);
-    } else {
+    } else if (f.type != FRAME_PROGRESS || orb_clock_ms() >= p->last_ms) {
       taken = -1;
     }
     int over = f.type == FRAME_DONE;
@@ -236,6 +242,14 @@ static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_
   }
 }
 
+/* What moves objects waits for all that hold the store. The process may have published before it failed. */
+static void let_go_of_made(const run_env *env, run_output *out) {
+  if (out->holds) {
+    objects_let_go(env->store);
+    out->holds = 0;
+  }
+}
+
 /* The process found an input that does not match its hash. Returns whether the job can be planned again: a damaged
  * embedding lost its row. */
 static int quarantine_inputs(const run_env *env, const collected *all) {
@@ -246,6 +260,7 @@ static int quarantine_inputs(const run_env *env, const collected *all) {
       continue;
     }
     verify_again(env->store, all->heads[i].object, all->heads[i].id, all->heads[i].sha);
+    objects_settle(env->store); /* the scrub may have moved it */
     gone |= all->heads[i].object == OBJECT_SPHERE &&
             catalogue_get(env->cat, RESOURCE_EMBEDDING, all->heads[i].id, &row) == STORE_NOT_FOUND;
     resource_free(&row);
@@ -281,12 +296,15 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
   memcpy(task.key, j->key, sizeof task.key);
   channel_result why = send_all(&process, &task, j->request, &inputs);
   let_go(&inputs);
-  int fine = why == CHANNEL_OK ? listen_to(&process, env, ctx, kind, j, inputs.alignment, out, problem, &why) : -1;
+  int fine = why == CHANNEL_OK
+                 ? listen_to(&process, env, ctx, kind, j, inputs.alignment, limits->hold_ms, out, problem, &why)
+                 : -1;
   int status = isolate_close(&process);
   if (fine == 0 && problem->name && strcmp(problem->name, "corrupt") == 0) {
+    let_go_of_made(env, out);
     out->gone |= quarantine_inputs(env, &inputs);
   }
-  if (fine >= 0 || why == CHANNEL_STOPPED) {
+  if (fine >= 0 || (why == CHANNEL_STOPPED && orb_context_check(ctx) != ORB_OK)) {
     return fine > 0; /* stopped: the context has the error */
   }
   end->died = 1;

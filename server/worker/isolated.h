@@ -7,7 +7,13 @@
 typedef struct isolated_limits {
   int64_t memory, deadline_ms, max_triangles;
   int threads, nice;
+  int64_t hold_ms; /* see ISOLATED_HOLD_MS */
 } isolated_limits;
+
+/* A process sends what it has made at its end, at once. From its first object on the daemon holds the store, which
+ * keeps deletions waiting and, behind them, all who publish. So the next frame must follow within this time: hashing
+ * the largest result takes seconds on a busy machine. A process that is late is killed, and counts as one that died. */
+enum { ISOLATED_HOLD_MS = 30000 };
 
 /* How a process ended that brought neither a result nor a problem. */
 typedef struct isolated_end {

@@ -219,7 +219,8 @@ static int run_somewhere(worker_pool *pool, const run_env *env, orb_context *ctx
                                     .deadline_ms = orb_clock_ms() + pool->options.job_ms,
                                     .max_triangles = pool->options.max_triangles,
                                     .threads = threads,
-                                    .nice = pool->options.nice};
+                                    .nice = pool->options.nice,
+                                    .hold_ms = ISOLATED_HOLD_MS};
     return isolated_run(env, ctx, job_kind(j), &task, &limits, out, problem, end);
   }
   FAULT_POINT(job_key(j));

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # The container from nothing, without an image registry: the base is a bare Debian under the name that the Dockerfile
-# asks for. Built by buildah, run by podman for one merge with a token, and stopped. Needs root and the Debian mirror.
+# asks for. Built by buildah, run by podman for one merge with a token, and stopped. It has no capability, may gain no
+# privilege, reads only its volume's files and its own, and has the usual seccomp profile; within that, isolate = strict
+# confines the processes of jobs. Needs root and the Debian mirror.
 #   tests/long/container.sh [FOLDER]     FOLDER (/tmp/orbmorph-package) keeps the bare Debian
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
@@ -17,6 +19,7 @@ fi
 # Certificates that were added to this machine hold for the build, too: a proxy may ask for them.
 mkdir -p "$at/base/usr/local/share/ca-certificates"
 cp /usr/local/share/ca-certificates/*.crt "$at/base/usr/local/share/ca-certificates/" 2>/dev/null || true
+echo 'cafile=/etc/ssl/certs/ca-certificates.crt' >"$at/base/root/.npmrc"
 if ! podman "${own[@]}" image exists docker.io/library/debian:12-slim; then
   tar -C "$at/base" -c . | podman "${own[@]}" import --quiet - docker.io/library/debian:12-slim
 fi
@@ -25,7 +28,8 @@ buildah "${own[@]}" bud --layers --isolation=chroot --pull-never --format docker
 
 # Without systemd, which podman would ask for cgroups and timers; limits that need no privilege.
 run=(podman "${own[@]}" --cgroup-manager cgroupfs --events-backend file --runtime runc)
-place=(--network host --no-healthcheck --ulimit nofile=4096:4096 --ulimit nproc=4096:4096 -v "$at/volume:/var/lib/orbmorph")
+place=(--network host --no-healthcheck --ulimit nofile=4096:4096 --ulimit nproc=4096:4096 -v "$at/volume:/var/lib/orbmorph"
+  --cap-drop all --security-opt no-new-privileges --read-only)
 rm -rf "$at/volume"
 mkdir -p "$at/volume"
 user=$("${run[@]}" image inspect --format '{{.Config.User}}' orbmorph)
@@ -37,7 +41,8 @@ chown "$owner" "$at/volume"
 token=$("${run[@]}" run --rm "${place[@]}" orbmorph token add web --scope read,write --data /var/lib/orbmorph)
 port=$((20000 + RANDOM % 20000))
 name=orbmorph-check-$$
-"${run[@]}" run -d --name "$name" "${place[@]}" orbmorph --listen "0.0.0.0:$port" --data /var/lib/orbmorph >/dev/null
+"${run[@]}" run -d --name "$name" "${place[@]}" orbmorph --listen "0.0.0.0:$port" --data /var/lib/orbmorph \
+  --isolate strict --workers 1 >/dev/null
 trap '"${run[@]}" rm -f "$name" >/dev/null 2>&1 || true' EXIT
 for _ in $(seq 100); do
   curl -fs "http://127.0.0.1:$port/readyz" >/dev/null && break
@@ -51,7 +56,28 @@ asset=$(ask -H 'Content-Type: application/json' -H 'Prefer: wait=60' -d "{\"shap
   "http://127.0.0.1:$port/v1/supermeshes" | sed 's/.*"asset":"\([^"]*\)".*/\1/')
 ask "http://127.0.0.1:$port$asset" >"$at/asset.glb"
 [ "$(head -c 4 "$at/asset.glb")" = glTF ]
+
+# A job that takes long: what its process may do, as the kernel of this machine says.
+says() { sed -n "s/^$2:[[:space:]]*//p" "/proc/$1/status"; }
+daemon=$("${run[@]}" inspect --format '{{.State.Pid}}' "$name")
+zygote=$(pgrep -P "$daemon" -f isolated-processes)
+c=$(upload elephant.ply)
+job=$(ask -H 'Content-Type: application/json' -d "{\"mesh\":\"$c\",\"method\":\"kernel-sampling\",\"options\":{\"step\":0.01,\"growth\":1.01,\"first_optimization\":1,\"displacement_threshold\":1e-15,\"max_iterations\":1000000}}" \
+  "http://127.0.0.1:$port/v1/embeddings" | sed 's/.*"url":"\([^"]*\)".*/\1/')
+for _ in $(seq 200); do
+  [ "$(ask "http://127.0.0.1:$port$job" | sed 's/.*"stage":"\([^"]*\)".*/\1/')" = embed ] && break
+  sleep 0.1
+done
+worker=$(pgrep -P "$zygote")
+for pid in "$daemon" "$worker"; do
+  [ "$(says "$pid" CapEff)" = 0000000000000000 ] && [ "$(says "$pid" CapBnd)" = 0000000000000000 ]
+  [ "$(says "$pid" NoNewPrivs)" = 1 ] && [ "$(says "$pid" Seccomp)" = 2 ]
+  [ "$(says "$pid" Uid | cut -f1)" = "$owner" ]
+done
+# The job's process has a filter of its own beside the container's.
+[ "$(says "$worker" Seccomp_filters)" -gt "$(says "$daemon" Seccomp_filters)" ]
+ask -X DELETE "http://127.0.0.1:$port$job" >/dev/null
 "${run[@]}" exec "$name" curl -fsS "http://127.0.0.1:$port/livez" >/dev/null
 "${run[@]}" stop -t 20 "$name" >/dev/null
 [ "$("${run[@]}" inspect --format '{{.State.ExitCode}}' "$name")" = 0 ]
-echo "the container is built, runs as its user, and ends when it is told to"
+echo "the container is built, runs as its user without privileges, confines its jobs, and ends when it is told to"

@@ -2,13 +2,15 @@
 // meshes and have them embedded. No connection is dropped, no other job counts an attempt, every accepted job ends, and
 // every result is there. ORB_SEED chooses the moments.
 //
-// The ways: SIGSEGV, SIGBUS, SIGKILL, an end by itself (SIGTERM), memory that runs out (RLIMIT_AS), and an endless wait
-// (SIGSTOP), which ends at the time limit.
+// The ways: the process itself reads from nowhere (SIGSEGV), reads across a word that must not be (SIGBUS), ends by itself,
+// or loops for ever, until its time limit (tests/long/hurt.py changes its next instruction); the kernel kills it because its
+// control group has no memory; it gets SIGKILL. Needs root.
 import assert from 'node:assert/strict';
-import { spawnSync } from 'node:child_process';
+import { spawn } from 'node:child_process';
 import { mkdtemp, rm } from 'node:fs/promises';
 import os from 'node:os';
 import path from 'node:path';
+import readline from 'node:readline';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { Daemon } from '../scenario/support/daemon.mjs';
 import { workers } from '../scenario/support/processes.mjs';
@@ -27,11 +29,18 @@ const d = await new Daemon(data, ['--workers', '2', '--job-seconds', '4', '--che
 let log = '';
 d.child.stderr.on('data', (chunk) => (log += chunk));
 
-const ways = ['SIGSEGV', 'SIGBUS', 'SIGKILL', 'SIGTERM', 'RLIMIT_AS', 'SIGSTOP'];
+const ways = ['segv', 'bus', 'SIGKILL', 'oom', 'loop', 'exit'];
 const died = Object.fromEntries(ways.map((way) => [way, 0]));
-/** Makes a process die; false if it has ended meanwhile. */
-function kill(pid, way) {
-  if (way === 'RLIMIT_AS') return spawnSync('prlimit', ['--pid', String(pid), '--as=1048576']).status === 0;
+const hurt = spawn('python3', [new URL('hurt.py', import.meta.url).pathname], { stdio: ['pipe', 'pipe', 'ignore'] });
+const answers = readline.createInterface({ input: hurt.stdout })[Symbol.asyncIterator]();
+/** Makes a process die, or loop for ever; false if it has ended meanwhile. */
+async function kill(pid, way) {
+  if (way !== 'SIGKILL') {
+    hurt.stdin.write(`${pid} ${way}\n`);
+    const { value, done } = await answers.next();
+    assert.ok(!done, 'hurt.py ended');
+    return value === '0';
+  }
   try {
     return process.kill(pid, way);
   } catch (error) {
@@ -71,13 +80,14 @@ for (let n = 0; n < deaths; ) {
   await Promise.race([sleep(20 + 300 * random()), failed]);
   const there = workers(d);
   const way = ways[n % ways.length];
-  if (there.length && kill(there[Math.floor(random() * there.length)], way)) {
+  if (there.length && (await Promise.race([kill(there[Math.floor(random() * there.length)], way), failed]))) {
     died[way]++;
     n++;
   }
   assert.ok(Date.now() - began < 3_600_000, `only ${n} deaths within an hour`);
 }
 stop = true;
+hurt.stdin.end();
 await Promise.all(busy);
 
 // Each death takes at most one attempt of one job, or one upload.

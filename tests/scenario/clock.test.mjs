@@ -1,9 +1,11 @@
-// The wall clock is set back by an hour while the daemon runs, as happens when machines boot.
+// The wall clock is set back or ahead by an hour while the daemon runs, as happens when machines boot.
 import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
 import net from 'node:net';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
-import { daemon, endless, patience } from './support/daemon.mjs';
+import { promisify } from 'node:util';
+import { binaries, daemon, endless, patience } from './support/daemon.mjs';
 import { preload } from './support/preload.mjs';
 import * as shapes from './support/shapes.mjs';
 
@@ -41,5 +43,39 @@ test('waits end and slow clients are disconnected even if the clock is set back'
     socket.resume();
   });
   assert.ok(closed);
+  const { uptime_seconds: up } = (await d.get('/readyz?verbose')).json;
+  assert.ok(up >= ahead / 1000 && up < 3000, `it has run for ${up} s`);
   assert.equal((await d.delete(job.url)).status, 200);
+});
+
+test('a clock that is set ahead ends tokens, and no job and no wait', {
+  skip: library ? false : 'ORB_CLOCK names no library',
+}, async (t) => {
+  const preloaded = preload([library]);
+  t.after(preloaded.remove);
+  const slow = (ms) => ({ LD_PRELOAD: preloaded.value, ORB_CLOCK_OFF: '-3600', ORB_CLOCK_AHEAD_MS: String(ms) });
+  const d = await daemon(t, {
+    args: ['--auth', 'on', '--workers', '1', '--job-seconds', '1800', '--idle-seconds', '1800'],
+    env: slow(8000), // by then the job is under way, on a busy machine too
+  });
+  const token = async (name, ...more) => {
+    const words = ['token', 'add', name, '--scope', 'read,write', '--tenant', 'web', ...more, '--data', d.data];
+    const { stdout } = await promisify(execFile)(binaries.daemon, words, {
+      env: { ...process.env, ...slow(600_000) }, // of the daemon's time
+    });
+    return { headers: { authorization: `Bearer ${stdout.trim()}` } };
+  };
+  const [own, brief] = [await token('own'), await token('brief', '--expires', '30m')];
+  const { id } = (await d.post('/v1/meshes', shapes.binaryPly(shapes.ball(5)), own)).json;
+  const job = (await d.post('/v1/embeddings', { mesh: id, ...endless }, brief)).json;
+  assert.ok(Date.parse(job.created) < Date.now() - 3_000_000, 'the clock was behind');
+  const seconds = 12; // the jump is within them
+  const waited = await d.get(job.url, { ...own, query: { wait: seconds } });
+  assert.deepEqual([waited.status, waited.json.state], [200, 'running'], waited.bytes.toString());
+  const late = await d.post('/v1/meshes', Buffer.from(shapes.tetrahedron), own);
+  assert.ok(Date.parse(late.json.created) > Date.now() - 60_000, 'and is right now');
+  assert.equal((await d.get(job.url, brief)).status, 401, 'its half hour is over by the clock');
+  const now = (await d.get(job.url, own)).json;
+  assert.deepEqual([now.state, now.attempt], ['running', 1], 'its limit counts the time that it has run');
+  assert.equal((await d.delete(job.url, own)).status, 200);
 });

@@ -172,6 +172,7 @@ test('a check that hangs delays nobody, and ends with its client, at check-secon
   }
   /** Uploads a file whose check is stopped as soon as it begins. */
   async function hang(signal) {
+    await until(() => workers(d).length === 0, 'processes that wait for more small files end', 20);
     for (let n = 0; ; n++) {
       const bytes = Buffer.concat([file, Buffer.from(' '.repeat(n))]);
       const reply = d.post('/v1/meshes', bytes, { signal }).catch((error) => error);

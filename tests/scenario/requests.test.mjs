@@ -72,6 +72,29 @@ test('a query or headers of any length get one answer at once', async (t) => {
   assert.equal((await d.get('/livez')).status, 200);
 });
 
+test('headers of very many short lines or cookies get one answer, however many there are', async (t) => {
+  const d = await daemon(t);
+  const ask = (lines) =>
+    raw(d, `GET /v1/meshes HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n${lines}\r\n`, { wait: 5000 });
+  const kinds = {
+    'empty lines': (n) => 'X:\r\n'.repeat(n),
+    'lines of 26 bytes': (n) => `X-Short: ${'y'.repeat(15)}\r\n`.repeat(n),
+    'lines of 50 bytes': (n) => `X-Short: ${'y'.repeat(39)}\r\n`.repeat(n),
+    'cookies of 6 bytes': (n) => `Cookie: ${'ab=cd;'.repeat(n)}\r\n`,
+    'cookies of 40 bytes': (n) => `Cookie: ${`ab=${'c'.repeat(36)};`.repeat(n)}\r\n`,
+  };
+  for (const [what, make] of Object.entries(kinds)) {
+    const seen = new Set();
+    // Each number around the one that fills the 16 KB of a connection.
+    for (let n = 60; n <= 260; n++) {
+      const reply = await ask(make(n));
+      assert.equal(reply.split('HTTP/1.1 ').length, 2, `${n} ${what}: ${reply}`);
+      seen.add(statusOf(reply));
+    }
+    assert.deepEqual([...seen], [200, 431], what);
+  }
+});
+
 test('unknown paths, unknown ids, wrong methods', async (t) => {
   const d = await daemon(t);
   for (const target of [

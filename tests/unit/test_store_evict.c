@@ -1,7 +1,10 @@
 /* Eviction over more rows than one page: rows that unfinished jobs need stay wherever they are in the order of use; the
- * others leave, oldest first, and no more than the budget requires. */
+ * others leave, oldest first, and no more than the budget requires. And what a damaged object takes with it. */
+#include <pthread.h>
+#include <semaphore.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -150,11 +153,74 @@ static void test_profiles_belong_to_the_supermesh(void **state) {
   }
 }
 
+/* Deletes the row of a damaged embedding, once the test says so. */
+typedef struct healer {
+  stored *s;
+  sem_t begun, may;
+  atomic_int healed;
+} healer;
+
+static void heal(void *user, object_kind kind, const char *id) {
+  healer *h = user;
+  sem_post(&h->begun);
+  sem_wait(&h->may);
+  evict_damaged(&h->s->env, kind, id);
+  atomic_store(&h->healed, 1);
+}
+
+static void *quarantine_main(void *user) {
+  healer *h = user;
+  int fd;
+  uint64_t size;
+  char id[API_ID_SIZE];
+  number_id(id, 'e', 1);
+  assert_int_equal(objects_read(h->s->env.store, OBJECT_SPHERE, id, &fd, &size), STORE_OK);
+  assert_int_equal(objects_quarantine(h->s->env.store, OBJECT_SPHERE, id, fd), STORE_NOT_FOUND);
+  close(fd);
+  return NULL;
+}
+
+static void *release_main(void *user) {
+  sem_post(&((healer *)user)->may);
+  return NULL;
+}
+
+/* Between the move to quarantine and the end of the row, the row names an object that is gone. Who finds that and waits
+ * sees the row no more. */
+static void test_a_damaged_result_is_gone_after_settling(void **state) {
+  stored *s = *state;
+  healer h = {.s = s};
+  pthread_t mover, releaser;
+  int fd;
+  uint64_t size;
+  char id[API_ID_SIZE];
+  number_id(id, 'e', 1);
+  sem_init(&h.begun, 0, 0);
+  sem_init(&h.may, 0, 0);
+  objects_settle(s->env.store); /* nothing to wait for */
+  add_embedding(s, 1, 1000);
+  assert_int_equal(objects_put(s->env.store, OBJECT_SPHERE, id, "wrong", 5), STORE_OK);
+  objects_on_quarantine(s->env.store, heal, &h);
+  assert_int_equal(pthread_create(&mover, NULL, quarantine_main, &h), 0);
+  sem_wait(&h.begun);
+  assert_int_equal(objects_read(s->env.store, OBJECT_SPHERE, id, &fd, &size), STORE_NOT_FOUND);
+  assert_true(is_there(s, 1));
+  assert_int_equal(pthread_create(&releaser, NULL, release_main, &h), 0);
+  objects_settle(s->env.store);
+  assert_int_equal(atomic_load(&h.healed), 1);
+  assert_false(is_there(s, 1));
+  pthread_join(mover, NULL);
+  pthread_join(releaser, NULL);
+  sem_destroy(&h.begun);
+  sem_destroy(&h.may);
+}
+
 int main(void) {
   log_setup(LOG_WARN, 0); /* each evicted object is logged */
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_needed_rows_fill_pages, setup, teardown),
       cmocka_unit_test_setup_teardown(test_profiles_belong_to_the_supermesh, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_damaged_result_is_gone_after_settling, setup, teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

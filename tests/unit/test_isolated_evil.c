@@ -1,0 +1,180 @@
+/* What a job's process can do to the daemon when a mesh has taken it over. This program is its own zygote, whose
+ * processes do what the request says. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <sodium.h>
+
+#include "isolate/task.h"
+#include "log.h"
+#include "store/owners.h"
+#include "worker/isolated.h"
+
+/* What follows the first object. */
+enum { DAMAGED = 'a', NOTHING = 'b', PROGRESS = 'c', OBJECTS = 'd' };
+
+typedef struct stored {
+  char data[64];
+  run_env env;
+  orb_context *ctx;
+} stored;
+
+static int setup(void **state) {
+  stored *s = calloc(1, sizeof *s);
+  strcpy(s->data, access("/dev/shm", W_OK) == 0 ? "/dev/shm/orbmorph-evil-XXXXXX" : "/tmp/orbmorph-evil-XXXXXX");
+  if (!mkdtemp(s->data) || objects_open(s->data, &s->env.store) != STORE_OK ||
+      catalogue_open(s->data, &s->env.cat) != STORE_OK || !isolate_start(ISOLATE_ON) ||
+      orb_context_create(&(orb_context_options){.threads = 1}, &s->ctx) != ORB_OK) {
+    return -1;
+  }
+  s->env.tenant = "";
+  *state = s;
+  return 0;
+}
+
+static int teardown(void **state) {
+  stored *s = *state;
+  char command[128];
+  isolate_stop();
+  orb_context_destroy(s->ctx);
+  catalogue_close(s->env.cat);
+  objects_close(s->env.store);
+  snprintf(command, sizeof command, "rm -rf %s", s->data);
+  int failed = system(command);
+  free(s);
+  return failed;
+}
+
+/* ---- the process ---- */
+
+static void send_object(int channel, const task_head *task) {
+  object_head head = {.kind = OBJECT_SPHERE};
+  int fd = memfd_create("object", MFD_CLOEXEC);
+  const struct iovec part = {&head, sizeof head};
+  memcpy(head.id, task->key, sizeof head.id);
+  if (fd < 0 || write(fd, "sphere", 6) != 6 ||
+      channel_send(channel, FRAME_OBJECT, &part, 1, fd, NULL, NULL) != CHANNEL_OK) {
+    _exit(9);
+  }
+  close(fd);
+}
+
+static void send_progress(int channel) {
+  progress_head head = {.stage = "store"};
+  const struct iovec part = {&head, sizeof head};
+  if (channel_send(channel, FRAME_PROGRESS, &part, 1, -1, NULL, NULL) != CHANNEL_OK) {
+    _exit(9);
+  }
+}
+
+static void evil(int channel) {
+  frame f;
+  task_head task;
+  if (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) != CHANNEL_OK || f.size < sizeof task) {
+    _exit(9);
+  }
+  memcpy(&task, f.bytes, sizeof task);
+  do {
+    frame_free(&f);
+  } while (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) == CHANNEL_OK && f.type != FRAME_GO);
+  if (task.key[0] == DAMAGED) {
+    api_problem problem = {0};
+    done_head done = {0};
+    send_object(channel, &task);
+    api_refuse(&problem, "corrupt", "An input was altered.");
+    task_end(channel, &done, NULL, &problem);
+  }
+  for (int sent = 0;; sent++) {
+    if (task.key[0] == OBJECTS || sent == 0) {
+      send_object(channel, &task);
+    }
+    if (task.key[0] == PROGRESS) {
+      send_progress(channel);
+    }
+    usleep(task.key[0] == NOTHING ? 1000000 : 1000);
+  }
+}
+
+/* ---- the daemon ---- */
+
+static void fill_id(char id[API_ID_SIZE], char letter) {
+  memset(id, letter, API_ID_SIZE - 1);
+  id[API_ID_SIZE - 1] = 0;
+}
+
+/* A mesh whose file is not what its row says. */
+static void add_damaged_mesh(stored *s, const char *id) {
+  char json[] = "{}";
+  int fresh;
+  resource row = {.kind = RESOURCE_MESH, .json = json, .bytes = 5, .created = 1};
+  memcpy(row.id, id, sizeof row.id);
+  fill_id(row.sha, '0');
+  assert_int_equal(objects_put(s->env.store, OBJECT_MESH, id, "wrong", 5), STORE_OK);
+  assert_int_equal(catalogue_put_for(s->env.cat, &row, "", 0, &fresh), STORE_OK);
+}
+
+/* Runs a job in a process that does this. Afterwards the store is free. */
+static int run(stored *s, char what, api_problem *problem, isolated_end *end) {
+  char key[API_ID_SIZE], mesh[API_ID_SIZE], request[128];
+  fill_id(key, what);
+  fill_id(mesh, 'e');
+  snprintf(request, sizeof request, "{\"mesh\":\"%s\"}", mesh);
+  const run_job j = {.key = key, .request = request};
+  const isolated_limits limits = {.memory = 64 << 20, .threads = 1, .max_triangles = 1000, .hold_ms = 300};
+  run_output out = {0};
+  int fine = isolated_run(&s->env, s->ctx, API_JOB_EMBEDDING, &j, &limits, &out, problem, end);
+  if (out.holds) {
+    objects_let_go(s->env.store);
+  }
+  assert_true(objects_exclude(s->env.store));
+  objects_let_go(s->env.store);
+  resource_free(&out.row);
+  return fine;
+}
+
+/* To move the input to quarantine, the daemon waits for all who hold the store: the job must not be one of them. */
+static void test_an_object_and_then_a_damaged_input(void **state) {
+  stored *s = *state;
+  api_problem problem = {0};
+  isolated_end end;
+  char mesh[API_ID_SIZE];
+  fill_id(mesh, 'e');
+  add_damaged_mesh(s, mesh);
+  assert_false(run(s, DAMAGED, &problem, &end));
+  assert_string_equal(problem.name, "corrupt");
+  assert_false(end.died);
+  assert_int_equal(objects_look(s->env.store, OBJECT_MESH, mesh), STORE_NOT_FOUND);
+  api_problem_free(&problem);
+}
+
+/* After its first object it neither ends nor dies. The context has no deadline: only the hold ends it. */
+static void test_an_object_and_then_no_end(void **state) {
+  static const char ways[] = {NOTHING, PROGRESS, OBJECTS};
+  for (size_t i = 0; i < sizeof ways; i++) {
+    api_problem problem = {0};
+    isolated_end end;
+    assert_false(run(*state, ways[i], &problem, &end));
+    assert_true(end.died);
+    assert_null(problem.name);
+  }
+}
+
+int main(int count, char **arguments) {
+  if (count > 1 && strcmp(arguments[1], ISOLATE_FLAG) == 0) {
+    isolate_zygote(evil);
+  }
+  log_setup(LOG_ERROR, 0);
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test_setup_teardown(test_an_object_and_then_a_damaged_input, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_an_object_and_then_no_end, setup, teardown),
+  };
+  return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
+}
