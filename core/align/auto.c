@@ -13,10 +13,10 @@
 #include "align/find/params.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
+#include "align/sheet/even.h"
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
-#include "embed/newton/newton.h"
 
 enum { LEAST_PAIRS = 3 };            /* that are pinned: two leave a rotation open */
 static const double MOST_COST = 1e9; /* of an alternative, where the best rough map does not bend the shapes at all */
@@ -363,38 +363,6 @@ static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shap
   return write_alternatives(ctx, shapes, m, out);
 }
 
-static void spheres_free(orb_context *ctx, double **points, int32_t shape_count) {
-  for (int32_t s = 0; points && s < shape_count; s++) {
-    orb_free(ctx, points[s]);
-  }
-  orb_free(ctx, points);
-}
-
-/* Embeds the shapes anew with the energy of angles. The given embeddings keep areas, which stretches limbs on the
- * sphere six times as much around as along: a straight edge of one shape then cuts off so much of an arc of the other
- * that one triangle in twelve flips where the shapes lie on each other. Angles leave half of these flips. *points: what
- * `even` refers to; the caller frees it. A sphere that is not certified leaves the given one. */
-static orb_status make_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, orb_align_shape *even,
-                            double **points) {
-  orb_embed_options options;
-  orb_embed_defaults(&options);
-  for (int32_t s = 0; s < shape_count; s++) {
-    const orb_mesh *mesh = shapes[s].mesh;
-    orb_certificate certificate;
-    even[s] = shapes[s];
-    points[s] = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
-    if (!points[s]) {
-      return ORB_E_NO_MEMORY;
-    }
-    ORB_TRY(orb_newton_run_angles(ctx, mesh, &options, points[s]));
-    ORB_TRY(orb_certify(ctx, points[s], mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate));
-    if (certificate.valid) {
-      even[s].points = points[s];
-    }
-  }
-  return ORB_OK;
-}
-
 static orb_status align_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                              const orb_align_options *options, orb_alignment *out) {
   matches m = {.clear = 1};
@@ -421,15 +389,11 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
     out->match.clear = 1;
     return ORB_OK;
   }
-  orb_align_shape *even = ORB_NEW(ctx, orb_align_shape, shape_count);
-  double **points = ORB_NEW0(ctx, double *, shape_count);
-  orb_status status = even && points ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_even_shapes even;
+  orb_status status = orb_even_shapes_create(ctx, shapes, shape_count, &even);
   if (status == ORB_OK) {
-    ORB_GO(status, make_even(ctx, shapes, shape_count, even, points), end);
-    status = align_even(ctx, even, shape_count, options, out);
+    status = align_even(ctx, even.shapes, shape_count, options, out);
   }
-end:
-  spheres_free(ctx, points, shape_count);
-  orb_free(ctx, even);
+  orb_even_shapes_free(ctx, &even);
   return status;
 }

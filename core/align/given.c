@@ -59,7 +59,7 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
                            orb_preset preset) {
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
-    const orb_map_guide guide = {.from = from, .target = targets ? targets[s] : NULL};
+    const orb_map_guide guide = {.from = from, .target = targets ? targets[s] : NULL, .keeps_angles = targets != NULL};
     double energy[2];
     int improved;
     int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || from == ORB_MAP_FROM_WALKS);

@@ -334,6 +334,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
                    .both = both,
                    .landmark_count = landmark_count,
                    .given_target = guide->target,
+                   .keeps_angles = guide->keeps_angles,
                    .springs = guide->springs,
                    .hopeless = INFINITY,
                    .twisted_energy = INFINITY};

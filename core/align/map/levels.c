@@ -56,7 +56,7 @@ orb_status orb_map_levels_begin(orb_map_run *c, orb_refiner **out) {
   orb_embed_defaults(&options);
   ORB_TRY(orb_refiner_create(c->ctx, c->hierarchy, &options, out));
   (*out)->settings.crowded = INFINITY;
-  if (c->given_target) {
+  if (c->keeps_angles) {
     orb_refiner_keep_angles(*out);
   }
   return ORB_OK;

@@ -10,6 +10,7 @@
  *   collapse.h   collapses of vertices that splits made
  *   thin.h       removes such vertices where nothing needs them
  *   copy.h       decimated copies of shapes
+ *   even.h       embeddings that keep angles
  *   copies.h     such copies in place of the later shapes of an alignment
  */
 #ifndef ORB_ALIGN_SHEET_SHEET_H

@@ -35,8 +35,10 @@ typedef struct orb_map_level_map {
 /* What guides a composed map. */
 typedef struct orb_map_guide {
   orb_map_from from;
-  const double *target;    /* NULL, or where each vertex of `moving` lies on the fixed shape, 3 a vertex in its space;
-                              replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
+  const double *target; /* NULL, or where each vertex of `moving` lies on the fixed shape, 3 a vertex in its space;
+                           replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
+  int keeps_angles;     /* the spheres do (sheet/even.h); then embeddings made on the way do as well, and the places of
+                           the targets are smoothed */
   orb_map_springs springs; /* with ORB_MAP_FROM_PINS and ORB_MAP_FROM_COPY */
   orb_map_level_map copy;  /* with ORB_MAP_FROM_COPY */
 } orb_map_guide;

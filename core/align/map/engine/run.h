@@ -49,6 +49,7 @@ typedef struct orb_map_run {
   double *fixed_points;       /* what they are now; NULL: as given */
   orb_map_candidate kept;     /* the best map from before they changed */
   double *x, *normal;         /* moving shape, area 4π */
+  int keeps_angles;           /* see orb_map_guide */
   const double *given_target; /* for registrations without samples, in the fixed shape's space; NULL: computed */
   int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
   double *target;             /* spatial targets, once the moving shape is registered */

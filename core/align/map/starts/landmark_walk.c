@@ -193,7 +193,7 @@ static orb_status walk_sheets(orb_map_run *c, int32_t count, int32_t finer, orb_
   orb_status status = ORB_OK;
   int32_t coarse = c->params.walk.level_each * count;
   coarse = finer * (coarse > c->params.walk.level ? coarse : c->params.walk.level);
-  const orb_walk_options options = {ORB_PRESET_FAST, coarse, c->given_target != NULL};
+  const orb_walk_options options = {ORB_PRESET_FAST, coarse, c->keeps_angles};
   int32_t *numbers = ORB_NEW(ctx, int32_t, count);
   if (!numbers) {
     return ORB_E_NO_MEMORY;

@@ -196,5 +196,5 @@ orb_status orb_map_place(orb_map_run *c, orb_map_level *level, const int32_t *to
   if (start == ORB_MAP_SPATIAL) {
     spread_out(c, level);
   }
-  return start == ORB_MAP_SPATIAL && c->given_target ? orb_map_smooth(c, level) : ORB_OK;
+  return start == ORB_MAP_SPATIAL && c->keeps_angles ? orb_map_smooth(c, level) : ORB_OK;
 }

@@ -20,8 +20,8 @@
  * normals of the registered shape, and with the nearest places on the fixed shape. */
 ORB_MUST_CHECK orb_status orb_map_register(orb_map_run *run, int samples);
 
-/* Puts the vertices of a level where the start has them; where targets are given, smoothed. to_mesh: of the surface's
- * vertices. */
+/* Puts the vertices of a level where the start has them; on spheres that keep angles, smoothed. to_mesh: of the
+ * surface's vertices. */
 ORB_MUST_CHECK orb_status orb_map_place(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh,
                                         orb_map_start start);
 
