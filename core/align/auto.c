@@ -1,10 +1,10 @@
 /* Alignment without landmarks.
  *
  * The shapes are embedded anew, on spheres that keep angles. Every later shape is matched with the first one
- * (find/match.c), and the composed map goes to the targets of its match. Where that leads to no good map, pairs of the
- * matches are pinned as landmarks, and the map is composed with them held and then without them. Where that leads to
- * none of two shapes either, samples of the match guide landmark walks. The alignment of least energy is returned. The
- * preset `fast` searches for rotations of the given spheres only.
+ * (find/match.c), and the composed map goes to the targets of its match. Where that leads to no good map of two shapes,
+ * samples of the match guide landmark walks. Where that leads to none either, pairs of the matches are pinned as
+ * landmarks, and the map is composed with them held and then without them. The alignment of least energy is returned.
+ * The preset `fast` searches for rotations of the given spheres only.
  */
 #include <math.h>
 #include <string.h>
@@ -127,7 +127,7 @@ static orb_status align_pairs(orb_context *ctx, const orb_align_shape *shapes, c
              end);
     }
   }
-  status = orb_align_given(ctx, shapes, shape_count, landmarks, m->count, &pin, out);
+  status = orb_align_pinned(ctx, shapes, shape_count, landmarks, m->count, &pin, out);
   if (status == ORB_E_BAD_LANDMARKS) {
     orb_error_clear(ctx);
     status = ORB_OK;
@@ -214,11 +214,16 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
   return ORB_OK;
 }
 
-/* What leads on where a match has led to no good map: its pairs are pinned, and then its targets guide walks. */
+/* What leads on where a match has led to no good map: its targets guide walks, which are quick, and where these lead to
+ * none either, its pairs are pinned. */
 static orb_status improve_poor(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                                const orb_align_options *options, double poor, orb_alignment *alignment) {
   orb_alignment other;
   int held;
+  if (m->shape_count == 2 && m->are_found && alignment->energy > poor) {
+    ORB_TRY(align_walks(ctx, shapes, m, options, &other));
+    keep_better(ctx, alignment, &other);
+  }
   if (m->count < LEAST_PAIRS || alignment->energy <= poor) {
     return ORB_OK;
   }
@@ -226,11 +231,6 @@ static orb_status improve_poor(orb_context *ctx, const orb_align_shape *shapes, 
   if (held) {
     keep_better(ctx, alignment, &other);
   }
-  if (m->shape_count > 2 || !m->are_found || alignment->energy <= poor) {
-    return ORB_OK;
-  }
-  ORB_TRY(align_walks(ctx, shapes, m, options, &other));
-  keep_better(ctx, alignment, &other);
   return ORB_OK;
 }
 

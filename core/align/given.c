@@ -371,6 +371,17 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
   return status;
 }
 
+orb_status orb_align_pinned(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                            const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                            orb_alignment *out) {
+  ORB_TRY(create(ctx, shapes, shape_count, landmarks, landmark_count, options, out));
+  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset);
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
 /* Refines the map of the copy of shape s, and puts the whole shape in the copy's place. *energy: INFINITY if there is
  * no map; both shapes then stay what they are. */
 static orb_status lift_shape(orb_context *ctx, orb_copied_shape *copied, const orb_landmark *landmarks, int32_t s,

@@ -30,6 +30,12 @@ ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shap
                                           const orb_landmark *landmarks, int32_t landmark_count,
                                           const orb_align_options *options, orb_alignment *out);
 
+/* The same with `pin` for pairs of a match that has led to no good map: neither a landmark walk alone nor the match is
+ * tried again. */
+ORB_MUST_CHECK orb_status orb_align_pinned(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                           const orb_landmark *landmarks, int32_t landmark_count,
+                                           const orb_align_options *options, orb_alignment *out);
+
 /* Improves the maps from the first shape to the others (orb_compose()), since aligned landmarks alone do not make a
  * good morph. Fills alignment->energy. targets: NULL, or for each shape but the first what orb_compose() takes. */
 ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,

@@ -371,7 +371,8 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
-    if (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0]) {
+    const int is_hopeless = c.given_target && c.best_energy > c.params.targets.hopeless;
+    if (!is_hopeless && (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0])) {
       ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
     }
   }
