@@ -33,6 +33,7 @@ typedef struct matches {
   double clear, lead;     /* least over the shapes */
   double bend;            /* most over the shapes */
   int are_found;          /* all of them */
+  int keep_angles;        /* the spheres of the shapes do */
 } matches;
 
 static void matches_free(orb_context *ctx, matches *m) {
@@ -62,8 +63,9 @@ static void gather(matches *m) {
   }
 }
 
-static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, matches *m) {
-  *m = (matches){.shape_count = shape_count, .clear = 1, .lead = INFINITY, .are_found = 1};
+static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, int keep_angles,
+                               matches *m) {
+  *m = (matches){.shape_count = shape_count, .clear = 1, .lead = INFINITY, .are_found = 1, .keep_angles = keep_angles};
   m->of = ORB_NEW0(ctx, orb_match, shape_count);
   m->targets = ORB_NEW0(ctx, const double *, shape_count);
   m->vertex = ORB_NEW(ctx, int32_t, ORB_MATCH_PAIRS * (size_t)shape_count);
@@ -141,7 +143,7 @@ static orb_status align_pairs(orb_context *ctx, const orb_align_shape *shapes, c
     orb_free(ctx, out->shapes[s].landmark_vertices);
     out->shapes[s].landmark_vertices = NULL;
   }
-  ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, options->preset), end);
+  ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, 0, options->preset), end);
   *held = 1;
 end:
   orb_free(ctx, at);
@@ -157,7 +159,7 @@ static orb_status align_walks(orb_context *ctx, const orb_align_shape *shapes, c
   orb_align_options rotated = *options;
   rotated.preset = ORB_PRESET_FAST;
   ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, out));
-  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_WALKS, m->targets, options->preset);
+  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_WALKS, m->targets, m->keep_angles, options->preset);
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
   }
@@ -191,7 +193,7 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
   ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, &next->alignment));
   next->is_open = 1;
   const double *const targets[2] = {NULL, next->target};
-  return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, targets, options->preset);
+  return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, targets, m->keep_angles, options->preset);
 }
 
 /* Makes the next best match the match, if its map has clearly less energy than the best one's: a twisted body bends
@@ -241,7 +243,8 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   const double poor = orb_map_params_of(options->preset).energy.poor;
   next_match next = {0};
   orb_status status;
-  ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? m->targets : NULL, options->preset));
+  ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? m->targets : NULL,
+                          m->keep_angles && m->are_found, options->preset));
   ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, &next), end);
   if (next.is_open && next.alignment.energy <= poor) {
     ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
@@ -363,37 +366,61 @@ static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shap
   return write_alternatives(ctx, shapes, m, out);
 }
 
-static orb_status align_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                             const orb_align_options *options, orb_alignment *out) {
+/* Aligns shapes whose spheres have been rotated onto each other, which `out` holds. */
+static orb_status align_rotated(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, int keep_angles,
+                                const orb_align_options *options, orb_alignment *out) {
   matches m = {.clear = 1};
-  orb_align_options rotated = *options;
-  rotated.preset = ORB_PRESET_FAST;
-  ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
-  orb_status status = ORB_OK;
-  out->match.clear = 1;
-  ORB_GO(status, find_matches(ctx, shapes, shape_count, &m), end);
+  orb_status status;
+  ORB_GO(status, find_matches(ctx, shapes, shape_count, keep_angles, &m), end);
   ORB_GO(status, follow_matches(ctx, shapes, &m, options, out), end);
   status = describe_matches(ctx, shapes, &m, out);
 end:
   matches_free(ctx, &m);
-  if (status != ORB_OK) {
-    orb_alignment_free(ctx, out);
-  }
   return status;
+}
+
+/* The same on spheres that keep angles. */
+static orb_status align_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                             const orb_align_options *rotated, const orb_align_options *options, orb_alignment *out) {
+  orb_even_shapes even;
+  orb_status status;
+  orb_alignment_free(ctx, out);
+  ORB_GO(status, orb_even_shapes_create(ctx, shapes, shape_count, &even), end);
+  ORB_GO(status, orb_align_given(ctx, even.shapes, shape_count, NULL, 0, rotated, out), end);
+  status = align_rotated(ctx, even.shapes, shape_count, 1, options, out);
+end:
+  orb_even_shapes_free(ctx, &even);
+  return status;
+}
+
+/* Do rotations alone make the given spheres correspond? Then areas say more than angles. */
+static orb_status are_alike(orb_context *ctx, orb_alignment *a, orb_preset preset, int *alike) {
+  *alike = 1;
+  for (int32_t s = 1; s < a->shape_count && *alike; s++) {
+    double energy;
+    ORB_TRY(orb_compose_energy(ctx, &a->shapes[0], &a->shapes[s], preset, &energy));
+    *alike = energy <= ORB_FIND_ALIKE;
+  }
+  return ORB_OK;
 }
 
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *out) {
-  if (options->preset == ORB_PRESET_FAST) {
-    ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, options, out));
+  orb_align_options rotated = *options;
+  rotated.preset = ORB_PRESET_FAST;
+  ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
+  orb_status status = ORB_OK;
+  int alike = 1;
+  if (options->preset != ORB_PRESET_FAST) {
+    ORB_GO(status, are_alike(ctx, out, options->preset, &alike), end);
+    status = alike ? align_rotated(ctx, shapes, shape_count, 0, options, out)
+                   : align_even(ctx, shapes, shape_count, &rotated, options, out);
+  } else {
     out->match.clear = 1;
-    return ORB_OK;
   }
-  orb_even_shapes even;
-  orb_status status = orb_even_shapes_create(ctx, shapes, shape_count, &even);
-  if (status == ORB_OK) {
-    status = align_even(ctx, even.shapes, shape_count, options, out);
+end:
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
   }
-  orb_even_shapes_free(ctx, &even);
   return status;
 }

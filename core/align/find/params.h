@@ -38,6 +38,9 @@ static const double ORB_FIND_BEHIND = 2;
  * tenth, so less of a gain says nothing: with 0.95, a twin of emmy-sidebend and cora-armscross, a pair of the half
  * `report`, wins by 0.89. */
 static const double ORB_FIND_OTHER_ABOVE = 1.25, ORB_FIND_OTHER_BEHIND = 4, ORB_FIND_OTHER_GAIN = 0.88;
+/* The energy of rotated spheres up to which the shapes are alike, as balls with small features are, and keep their
+ * given spheres. Rotated spheres of people in poses have 4 and more. */
+static const double ORB_FIND_ALIKE = 2;
 /* What `clear` is where all other maps are the same. */
 static const double ORB_FIND_CLEAR_ALONE = 0.5;
 

@@ -257,7 +257,7 @@ static orb_status run_walk(orb_map_run *c) {
 /* Chooses the starts by what is known of the map as given. */
 static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   /* A good map without landmarks is kept: symmetric shapes have others that are as good. */
-  if (c->pairs.landmarks == 0 && c->best_energy <= c->params.energy.good) {
+  if (c->pairs.landmarks == 0 && !c->keeps_angles && c->best_energy <= c->params.energy.good) {
     ORB_TRY(orb_map_levels_prepare(c));
     return orb_map_run_start(c, ORB_MAP_GIVEN);
   }
@@ -324,6 +324,17 @@ static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double ene
     }
   }
   return ORB_OK;
+}
+
+orb_status orb_compose_energy(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, orb_preset preset,
+                              double *energy) {
+  orb_map_run c = {.ctx = ctx, .params = orb_map_params_of(preset), .fixed = fixed, .moving = moving};
+  orb_status status;
+  ORB_GO(status, prepare(&c), done);
+  status = given_energy(&c, energy);
+done:
+  orb_map_run_free(&c);
+  return status;
 }
 
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,

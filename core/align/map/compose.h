@@ -32,4 +32,8 @@ ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed
                                       int32_t landmark_count, const orb_map_guide *guide, orb_preset preset,
                                       double energy[2], int *improved);
 
+/* The energy of the map as given. O(vertices) and a location for each. */
+ORB_MUST_CHECK orb_status orb_compose_energy(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving,
+                                             orb_preset preset, double *energy);
+
 #endif
