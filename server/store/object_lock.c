@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <time.h>
 
+#include "orbmorph/context.h"
+
 struct object_lock {
   pthread_mutex_t lock;
   database db;
@@ -14,6 +16,7 @@ struct object_lock {
   int64_t number;
   char name[33]; /* of its announcements */
   int announced;
+  int64_t kept_until; /* by orb_clock_ms(): an announcement stands that long at least */
 };
 
 static _Thread_local int64_t number_of_thread;
@@ -175,15 +178,15 @@ int object_lock_announce(object_lock *l) {
 }
 
 void object_lock_keep_announced(object_lock *l) {
-  l->announced = 0;
+  l->kept_until = orb_clock_ms() + OBJECT_LOCK_DELETES_MS;
 }
 
 void object_lock_let_go(object_lock *l) {
   char sql[96];
-  if (l->announced) {
+  if (l->announced && orb_clock_ms() >= l->kept_until) {
     snprintf(sql, sizeof sql, "DELETE FROM deletion WHERE node='%s'", l->name);
     change(l, sql);
-    l->announced = 0;
   }
+  l->announced = 0;
   let_all_go(l);
 }

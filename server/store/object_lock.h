@@ -33,7 +33,8 @@ int object_lock_check(database *db, int64_t number);
 int object_lock_exclude(object_lock *l);
 void object_lock_let_go(object_lock *l);
 /* Of who excludes others: announces a deletion. 0: the lock was lost, nothing may be deleted. object_lock_let_go()
- * withdraws the announcement, unless object_lock_keep_announced() says that S3 has not answered the request. */
+ * withdraws it, unless object_lock_keep_announced() was called less than OBJECT_LOCK_DELETES_MS ago: S3 has not
+ * answered a request, and later ones that it answers change nothing about that. */
 enum { OBJECT_LOCK_DELETES_MS = 15000 }; /* three times BUCKET_DELETE_S: the clocks of S3's machines may differ */
 int object_lock_announce(object_lock *l);
 void object_lock_keep_announced(object_lock *l);

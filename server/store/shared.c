@@ -14,15 +14,17 @@
  * smallest: a claim that finds none must not read a million. The kind is part of the text, so that each kind uses its
  * own index. */
 #define LOOK_AT "64"
-#define FITS(of_kind, order)                                                                                  \
-  "(SELECT j.id, j.priority, j.seq, j.suspect FROM"                                                           \
-  "  (SELECT id, key, priority, seq, suspect, cost, big FROM job WHERE owner=t.owner AND state=0 AND waits=0" \
-  "   AND " of_kind " ORDER BY " order " LIMIT " LOOK_AT                                                      \
-  ") AS j"                                                                                                    \
-  "  WHERE j.cost<=?3 AND j.big<=?4 AND j.suspect<=?5"                                                        \
-  "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"                                     \
+#define READY(of_kind) "owner=t.owner AND state=0 AND waits=0 AND " of_kind
+#define FITS(which)                                                                              \
+  "(SELECT j.id, j.priority, j.seq, j.suspect FROM"                                              \
+  "  (SELECT id, key, priority, seq, suspect, cost, big FROM job WHERE " which " LIMIT " LOOK_AT \
+  ") AS j"                                                                                       \
+  "  WHERE j.cost<=?3 AND j.big<=?4 AND j.suspect<=?5"                                           \
+  "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"                        \
   "  ORDER BY j.priority DESC, j.seq LIMIT 1)"
-#define PICK(next) \
+#define FIRST(of_kind) FITS(READY(of_kind) " ORDER BY priority DESC, seq")
+#define SMALLEST(of_kind) FITS(READY(of_kind) " AND cost<=?3 ORDER BY cost")
+#define PICK(owners, next) \
   "WITH live AS (SELECT name, workers FROM node WHERE until>=clock_ms() AND workers>0),"                              \
   " busy AS (SELECT owner, count(*) FILTER (WHERE kind<>2) AS computing, count(*) FILTER (WHERE kind=2) AS fetching," \
   "  coalesce(sum(greatest(0, clock_ms()-claimed-" ESTIMATE("job") ")) FILTER (WHERE kind<>2), 0) AS beyond"          \
@@ -31,17 +33,20 @@
   "  (SELECT owner FROM turn WHERE ready>0 UNION SELECT owner FROM busy WHERE computing>0) AS active))) AS workers)"  \
   " SELECT next.id FROM turn t LEFT JOIN busy b ON b.owner=t.owner CROSS JOIN share s CROSS JOIN LATERAL"             \
   " (" next ") AS next"                                                                                               \
-  " WHERE t.ready>0 AND (?6=0 OR (coalesce(b.computing, 0)=0"                                                         \
+  " WHERE t.ready>0 AND " owners " AND (?6=0 OR (coalesce(b.computing, 0)=0"                                          \
   "   AND (SELECT sum(computing) FROM busy)>=(SELECT sum(workers) FROM live)))"                                       \
   "  AND (?2=0 OR coalesce(b.fetching, 0)<?7)"                                                                        \
   "  AND (?5=1 OR ?2=1 OR ?6=1 OR ?1<>(SELECT min(name) FROM live)"                                                   \
   "   OR NOT EXISTS(SELECT 1 FROM job k WHERE k.state=0 AND k.waits=0 AND k.suspect=1))"                              \
   " ORDER BY next.suspect DESC, next.priority/8 DESC, (coalesce(b.computing, 0)>=s.workers),"                         \
   "  t.service+coalesce(b.beyond, 0), next.seq LIMIT 1"
-/* Append runs its second part only if the first has no row. */
-#define FITS_OR_SMALL(of_kind) FITS(of_kind, "priority DESC, seq") " UNION ALL " FITS(of_kind, "cost") " LIMIT 1"
-static const char pick_computing[] = PICK(FITS_OR_SMALL("kind<>2"));
-static const char pick_fetching[] = PICK(FITS("kind=2", "priority DESC, seq"));
+#define ANY_COST "9223372036854775807"
+/* An owner without a job that is small enough costs one look. The second part of UNION ALL runs only if the first has
+ * no row. */
+static const char pick_computing[] =
+    PICK("(?3=" ANY_COST " OR EXISTS(SELECT 1 FROM job WHERE " READY("kind<>2") " AND cost<=?3))",
+         FIRST("kind<>2") " UNION ALL " SMALLEST("kind<>2") " LIMIT 1");
+static const char pick_fetching[] = PICK("true", FIRST("kind=2"));
 
 /* Another claim of the same moment skips the row, where the lock of transactions did not keep it waiting. */
 static const char take[] =

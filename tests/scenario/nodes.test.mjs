@@ -10,7 +10,7 @@ import path from 'node:path';
 import test from 'node:test';
 import { Cluster, LEASE } from './support/cluster.mjs';
 import { Collector } from './support/collector.mjs';
-import { assertProblem, endless, samples, until } from './support/daemon.mjs';
+import { assertProblem, daemon, endless, samples, until } from './support/daemon.mjs';
 import { haproxy, lacksHaproxy } from './support/haproxy.mjs';
 import { origin } from './support/origin.mjs';
 import { busy, half, late, lost, pass, s3Proxy } from './support/s3_proxy.mjs';
@@ -144,6 +144,37 @@ test('what one node accepts, others run and show', async (t) => {
   assert.match(await c.check(), / 0 wrong, 0 objects without a row/);
   if (lacksHaproxy) t.diagnostic(lacksHaproxy);
   else await behindHaproxy(t, [a, b]);
+});
+
+test('the same requests give the same ids and bytes as one daemon on SQLite and files', async (t) => {
+  const c = new Cluster(t);
+  const alone = await daemon(t, { program: [process.env.ORB_DAEMON] });
+  const nodes = [await c.node('--workers', '1'), await c.node('--role', 'serve')];
+  const pair = [shapes.obj(shapes.egg(3)), shapes.binaryPly(shapes.bean(3))];
+  const results = [];
+  for (const [one, other] of [[alone, alone], nodes]) {
+    const found = [];
+    const keep = async (target) => {
+      const reply = await one.get(target);
+      assert.equal(reply.status, 200, target);
+      found.push([target, createHash('sha256').update(reply.bytes).digest('hex')]);
+    };
+    const meshes = [];
+    for (const bytes of pair) meshes.push((await other.upload(bytes)).json);
+    for (const { url } of meshes) await keep(`${url}/file`);
+    for (const { id } of meshes) {
+      const { url } = await other.made('/v1/embeddings', { mesh: id });
+      await keep(`${url}/sphere.ply`);
+    }
+    for (const remesh of ['overlay', 'adaptive']) {
+      const wanted = { shapes: meshes.map(({ id }) => ({ mesh: id })), remesh: { method: remesh } };
+      const { url } = await other.made('/v1/supermeshes', wanted);
+      await keep(`${url}/asset.glb`);
+      await keep(`${url}/asset.glb?profile=quantized`);
+    }
+    results.push(found);
+  }
+  assert.deepEqual(results[1], results[0]);
 });
 
 /** Clients of haproxy do not miss a node that is killed. */
