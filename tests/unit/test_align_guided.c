@@ -53,7 +53,7 @@ static void dog_to_giraffe(void **state) {
   assert_int_equal(orb_align(ctx, shapes, 2, NULL, 0, &options, &alignment), ORB_OK);
   assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
   const double *targets[2] = {NULL, match.target};
-  assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_WALKS, targets, ORB_PRESET_DEFAULT), ORB_OK);
+  assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_WALKS, targets, 0, ORB_PRESET_DEFAULT), ORB_OK);
   assert_true(alignment.energy <= orb_map_params_of(ORB_PRESET_DEFAULT).energy.poor);
   check_alignment(&alignment, 0);
   orb_alignment_free(ctx, &alignment);
