@@ -1,0 +1,152 @@
+/* Spheres that keep angles, and places smoothed on a sphere. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "align/map/starts/smooth.h"
+#include "align/sheet/even.h"
+#include "numeric/vec3.h"
+#include "orbmorph/embed.h"
+#include "support_shapes.h"
+
+/* A ball with a long limb, which no embedding on the sphere keeps. */
+static orb_mesh limbed(orb_context *ctx) {
+  orb_mesh mesh = shape_globe(ctx, 40, 60);
+  for (int32_t v = 0; v < mesh.vertex_count; v++) {
+    double *p = mesh.positions + 3 * (size_t)v;
+    (void)orb_normalize(p);
+    const double out = 6 * exp(-40 * (1 - p[2]));
+    p[2] += out;
+  }
+  return mesh;
+}
+
+static double mean_angle(orb_context *ctx, const orb_mesh *mesh, const double *points) {
+  orb_distortion distortion;
+  assert_int_equal(
+      orb_distortion_measure(ctx, mesh->positions, points, mesh->triangles, mesh->triangle_count, &distortion), ORB_OK);
+  return distortion.angle.mean;
+}
+
+/* The triangles are certified, and nearer to their own shapes than those of an embedding that keeps areas. */
+static void angles_are_kept(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_embed_options options;
+  orb_embedding embedding;
+  orb_even_shapes even;
+  orb_certificate certificate;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh mesh = limbed(ctx);
+  orb_embed_defaults(&options);
+  assert_int_equal(orb_embed(ctx, &mesh, &options, &embedding), ORB_OK);
+  const orb_align_shape shape = {&mesh, embedding.points};
+  assert_int_equal(orb_even_shapes_create(ctx, &shape, 1, &even), ORB_OK);
+  assert_ptr_not_equal(even.shapes[0].points, embedding.points);
+  assert_int_equal(
+      orb_certify(ctx, even.shapes[0].points, mesh.vertex_count, mesh.triangles, mesh.triangle_count, &certificate),
+      ORB_OK);
+  assert_true(certificate.valid);
+  assert_true(mean_angle(ctx, &mesh, even.shapes[0].points) < 0.8 * mean_angle(ctx, &mesh, embedding.points));
+  orb_even_shapes_free(ctx, &even);
+  orb_embedding_free(ctx, &embedding);
+  shape_free(ctx, &mesh);
+  orb_context_destroy(ctx);
+}
+
+/* A ball that is mapped to itself, and the points at which its vertices are placed. */
+typedef struct scene {
+  orb_context *ctx;
+  orb_mesh mesh;
+  orb_aligned_shape shape;
+  orb_corner_table table;
+  orb_map_run run;
+  orb_map_level level;
+  double *points;
+} scene;
+
+static void open_scene(scene *s) {
+  memset(s, 0, sizeof *s);
+  assert_int_equal(orb_context_create(NULL, &s->ctx), ORB_OK);
+  s->mesh = shape_ball(s->ctx, 4);
+  const size_t n = (size_t)s->mesh.vertex_count;
+  s->points = malloc(3 * n * sizeof(double));
+  assert_non_null(s->points);
+  memcpy(s->points, s->mesh.positions, 3 * n * sizeof(double));
+  s->shape = (orb_aligned_shape){.mesh = s->mesh, .points = s->mesh.positions};
+  s->run = (orb_map_run){.ctx = s->ctx,
+                         .params = orb_map_params_of(ORB_PRESET_DEFAULT),
+                         .x = s->mesh.positions,
+                         .position = malloc(3 * n * sizeof(double)),
+                         .local = malloc(n * sizeof(int32_t)),
+                         .vertex_count = s->mesh.vertex_count};
+  assert_true(s->run.position && s->run.local);
+  assert_int_equal(orb_map_surface_create(s->ctx, &s->shape, &s->run.b), ORB_OK);
+  assert_int_equal(orb_corner_table_create(s->ctx, &s->mesh, &s->table), ORB_OK);
+}
+
+static void close_scene(scene *s) {
+  orb_map_level_free(s->ctx, &s->level);
+  orb_corner_table_free(s->ctx, &s->table);
+  orb_map_surface_free(s->ctx, &s->run.b);
+  free(s->run.position);
+  free(s->run.local);
+  free(s->points);
+  shape_free(s->ctx, &s->mesh);
+  orb_context_destroy(s->ctx);
+}
+
+/* Places the vertices at s->points, smooths, and returns how far the worst one is from where it belongs. */
+static double smooth(scene *s) {
+  double far = 0;
+  assert_int_equal(orb_map_full_level(&s->run, s->points, &s->table, &s->level), ORB_OK);
+  assert_int_equal(orb_map_smooth(&s->run, &s->level), ORB_OK);
+  for (int32_t v = 0; v < s->level.count; v++) {
+    const int32_t u = s->table.to_mesh[s->level.vertex[v]];
+    const double *x = s->level.x + 3 * (size_t)v, *home = s->mesh.positions + 3 * (size_t)u;
+    double place[3];
+    far = fmax(far, sqrt(orb_distance2(x, home)));
+    orb_map_surface_at(&s->run.b, &s->level.place[v], NULL, place, NULL);
+    assert_true(orb_distance2(place, x) < 1e-12); /* located where it is */
+  }
+  return far;
+}
+
+static void true_places_stay(void **state) {
+  (void)state;
+  scene s;
+  open_scene(&s);
+  assert_true(smooth(&s) < 1e-3);
+  assert_int_equal(orb_map_level_flips(&s.level), 0);
+  close_scene(&s);
+}
+
+/* Vertices that are placed on the other side of the ball, as where limbs touch, come back to their neighbours. */
+static void outliers_come_back(void **state) {
+  (void)state;
+  scene s;
+  open_scene(&s);
+  for (int32_t v = 0; v < s.mesh.vertex_count; v += 29) {
+    for (int k = 0; k < 3; k++) {
+      s.points[3 * (size_t)v + (size_t)k] *= -1;
+    }
+  }
+  assert_true(smooth(&s) < 0.1);
+  assert_int_equal(orb_map_level_flips(&s.level), 0);
+  close_scene(&s);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(angles_are_kept),
+      cmocka_unit_test(true_places_stay),
+      cmocka_unit_test(outliers_come_back),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
