@@ -9,6 +9,7 @@
 #include "align/find/match.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
+#include "align/sheet/even.h"
 #include "orbmorph/align.h"
 #include "orbmorph/embed.h"
 #include "orbmorph/format.h"
@@ -38,6 +39,7 @@ static void dog_to_giraffe(void **state) {
   orb_mesh mesh[2];
   orb_embedding embedding[2];
   orb_align_shape shapes[2];
+  orb_even_shapes even;
   orb_embed_options embed;
   orb_align_options options;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
@@ -50,10 +52,12 @@ static void dog_to_giraffe(void **state) {
   orb_align_defaults(&options);
   options.method = ORB_ALIGN_AUTO;
   options.preset = ORB_PRESET_FAST; /* rotations only */
-  assert_int_equal(orb_align(ctx, shapes, 2, NULL, 0, &options, &alignment), ORB_OK);
+  assert_int_equal(orb_even_shapes_create(ctx, shapes, 2, &even), ORB_OK);
+  assert_int_equal(orb_align(ctx, even.shapes, 2, NULL, 0, &options, &alignment), ORB_OK);
+  orb_even_shapes_free(ctx, &even);
   assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
   const double *targets[2] = {NULL, match.target};
-  assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_WALKS, targets, 0, ORB_PRESET_DEFAULT), ORB_OK);
+  assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_WALKS, targets, 1, ORB_PRESET_DEFAULT), ORB_OK);
   assert_true(alignment.energy <= orb_map_params_of(ORB_PRESET_DEFAULT).energy.poor);
   check_alignment(&alignment, 0);
   orb_alignment_free(ctx, &alignment);
