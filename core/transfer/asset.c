@@ -172,6 +172,9 @@ static orb_status make_textures(orb_context *ctx, orb_draft *draft) {
     return ORB_E_NO_MEMORY;
   }
   ORB_TRY(orb_home_triangles(ctx, draft->supermesh, &draft->shapes[0], 0, draft->home));
+  if (draft->has_holes) {
+    ORB_TRY(orb_holes_settle(ctx, draft->supermesh, mesh, draft->home));
+  }
   return mesh->texcoords ? orb_wedge_texcoords(ctx, draft->supermesh, &draft->shapes[0], draft->home, &draft->texcoords)
                          : ORB_OK;
 }

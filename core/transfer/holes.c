@@ -3,7 +3,13 @@
 #include <stdio.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "mesh/dropped.h"
+#include "numeric/vec3.h"
+
+/* Area of a group of slivers, as a share of the surface. The coordinates of an asset are rounded by 6e-8, so a group
+ * with less is no higher than rounding. */
+static const double SLIVER = 1e-8;
 
 int orb_has_holes(const orb_mesh *mesh) {
   for (int32_t t = 0; mesh->source_triangle && t < mesh->triangle_count; t++) {
@@ -12,6 +18,84 @@ int orb_has_holes(const orb_mesh *mesh) {
     }
   }
   return 0;
+}
+
+typedef struct grouping {
+  const orb_supermesh *supermesh;
+  const orb_mesh *mesh;
+  int32_t *home, *twin, *group; /* group: triangles of one, in the order in which they were found */
+  unsigned char *seen;
+} grouping;
+
+static int fills(const grouping *g, int32_t t) {
+  return g->mesh->source_triangle[g->home[t]] == ORB_MADE_FILL;
+}
+
+/* On the first shape. */
+static double area_of(const grouping *g, int32_t t) {
+  const int32_t *v = g->supermesh->triangles + 3 * (int64_t)t;
+  double p[3][3], a[3], b[3], normal[3];
+  for (int k = 0; k < 3; k++) {
+    orb_place_position(g->mesh, &g->supermesh->places[v[k]], p[k]);
+  }
+  orb_sub(p[1], p[0], a);
+  orb_sub(p[2], p[0], b);
+  orb_cross(a, b, normal);
+  return orb_length(normal) / 2;
+}
+
+/* Gathers the triangles that edges join to t on its side of the rims. Returns how many; *area: theirs; *beside: the
+ * home of a triangle across a rim. */
+static int32_t gather(grouping *g, int32_t t, double *area, int32_t *beside) {
+  int32_t count = 1;
+  g->group[0] = t;
+  g->seen[t] = 1;
+  *area = 0;
+  *beside = g->home[t];
+  for (int32_t i = 0; i < count; i++) {
+    *area += area_of(g, g->group[i]);
+    for (int k = 0; k < 3; k++) {
+      const int32_t other = g->twin[3 * (int64_t)g->group[i] + k] / 3;
+      if (fills(g, other) != fills(g, t)) {
+        *beside = g->home[other];
+      } else if (!g->seen[other]) {
+        g->seen[other] = 1;
+        g->group[count++] = other;
+      }
+    }
+  }
+  return count;
+}
+
+orb_status orb_holes_settle(orb_context *ctx, const orb_supermesh *supermesh, const orb_mesh *mesh, int32_t *home) {
+  const int32_t count = supermesh->triangle_count;
+  grouping g = {.supermesh = supermesh,
+                .mesh = mesh,
+                .home = home,
+                .twin = ORB_NEW(ctx, int32_t, 3 * (int64_t)count),
+                .group = ORB_NEW(ctx, int32_t, count),
+                .seen = ORB_NEW0(ctx, unsigned char, count)};
+  orb_status status = g.twin && g.group && g.seen ? ORB_OK : ORB_E_NO_MEMORY;
+  double all = 0;
+  if (status != ORB_OK) {
+    goto end;
+  }
+  ORB_GO(status, orb_mesh_twins(ctx, supermesh->triangles, count, supermesh->vertex_count, g.twin), end);
+  for (int32_t t = 0; t < count; t++) {
+    all += area_of(&g, t);
+  }
+  for (int32_t t = 0; t < count; t++) {
+    double area;
+    int32_t beside, size = g.seen[t] ? 0 : gather(&g, t, &area, &beside);
+    for (int32_t i = 0; i < size && area < SLIVER * all; i++) {
+      home[g.group[i]] = beside;
+    }
+  }
+end:
+  orb_free(ctx, g.twin);
+  orb_free(ctx, g.group);
+  orb_free(ctx, g.seen);
+  return status;
 }
 
 orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
