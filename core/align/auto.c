@@ -143,7 +143,7 @@ static orb_status align_pairs(orb_context *ctx, const orb_align_shape *shapes, c
     orb_free(ctx, out->shapes[s].landmark_vertices);
     out->shapes[s].landmark_vertices = NULL;
   }
-  ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, 0, options->preset), end);
+  ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, options->preset), end);
   *held = 1;
 end:
   orb_free(ctx, at);
@@ -159,7 +159,8 @@ static orb_status align_walks(orb_context *ctx, const orb_align_shape *shapes, c
   orb_align_options rotated = *options;
   rotated.preset = ORB_PRESET_FAST;
   ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, out));
-  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_WALKS, m->targets, m->keep_angles, options->preset);
+  const orb_aims aims = {.targets = m->targets, .keep_angles = m->keep_angles};
+  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_WALKS, &aims, options->preset);
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
   }
@@ -180,9 +181,10 @@ static void next_free(orb_context *ctx, next_match *next) {
 }
 
 /* Composes two shapes towards the next best match, unless the best one has led to a good map, or the next one is far
- * behind. */
+ * behind. Its first start is compared with that of the best match, which had the same effort; started: the energy after
+ * that. Unless it comes near, nothing more is tried. */
 static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                            const orb_align_options *options, double energy, next_match *next) {
+                            const orb_align_options *options, double energy, double started, next_match *next) {
   orb_align_options rotated = *options;
   rotated.preset = ORB_PRESET_FAST;
   if (m->shape_count != 2 || m->of[1].other_count == 0 || !(energy > ORB_FIND_OTHER_ABOVE) ||
@@ -193,7 +195,8 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
   ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, &next->alignment));
   next->is_open = 1;
   const double *const targets[2] = {NULL, next->target};
-  return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, targets, m->keep_angles, options->preset);
+  const orb_aims aims = {.targets = targets, .keep_angles = m->keep_angles, .beat = ORB_FIND_OTHER_STARTED * started};
+  return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, &aims, options->preset);
 }
 
 /* Makes the next best match the match, if its map has clearly less energy than the best one's: a twisted body bends
@@ -219,14 +222,14 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
 /* What leads on where a match has led to no good map: its targets guide walks, which are quick, and where these lead to
  * none either, its pairs are pinned. */
 static orb_status improve_poor(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                               const orb_align_options *options, double poor, orb_alignment *alignment) {
+                               const orb_align_options *options, orb_alignment *alignment) {
   orb_alignment other;
   int held;
-  if (m->shape_count == 2 && m->are_found && alignment->energy > poor) {
+  if (m->shape_count == 2 && m->are_found && alignment->energy > ORB_FIND_WALKS_ABOVE) {
     ORB_TRY(align_walks(ctx, shapes, m, options, &other));
     keep_better(ctx, alignment, &other);
   }
-  if (m->count < LEAST_PAIRS || alignment->energy <= poor) {
+  if (m->count < LEAST_PAIRS || alignment->energy <= ORB_FIND_PINS_ABOVE) {
     return ORB_OK;
   }
   ORB_TRY(align_pairs(ctx, shapes, m, options, &other, &held));
@@ -243,13 +246,14 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   const double poor = orb_map_params_of(options->preset).energy.poor;
   next_match next = {0};
   orb_status status;
-  ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? m->targets : NULL,
-                          m->keep_angles && m->are_found, options->preset));
-  ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, &next), end);
+  double started = INFINITY;
+  const orb_aims aims = {.targets = m->targets, .keep_angles = m->keep_angles, .started = &started};
+  ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? &aims : NULL, options->preset));
+  ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, started, &next), end);
   if (next.is_open && next.alignment.energy <= poor) {
     ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
   }
-  ORB_GO(status, improve_poor(ctx, shapes, m, options, poor, alignment), end);
+  ORB_GO(status, improve_poor(ctx, shapes, m, options, alignment), end);
   status = next_take(ctx, m, poor, &next, alignment);
 end:
   next_free(ctx, &next);

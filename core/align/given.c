@@ -55,11 +55,17 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
   return ORB_OK;
 }
 
-orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from, const double *const *targets,
-                           int keep_angles, orb_preset preset) {
+orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from, const orb_aims *aims,
+                           orb_preset preset) {
+  const orb_aims none = {0};
   double sum = 0;
+  aims = aims ? aims : &none;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
-    const orb_map_guide guide = {.from = from, .target = targets ? targets[s] : NULL, .keeps_angles = keep_angles};
+    const orb_map_guide guide = {.from = from,
+                                 .target = aims->targets ? aims->targets[s] : NULL,
+                                 .keeps_angles = aims->keep_angles,
+                                 .beat = aims->beat,
+                                 .started = aims->started};
     double energy[2];
     int improved;
     int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || from == ORB_MAP_FROM_WALKS);
@@ -346,7 +352,7 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const
     }
   }
   if (options->preset == ORB_PRESET_QUALITY || (energy > good && !walked && !posed)) {
-    return orb_compose_all(ctx, a, ORB_MAP_FROM_SPACE, NULL, 0, options->preset);
+    return orb_compose_all(ctx, a, ORB_MAP_FROM_SPACE, NULL, options->preset);
   }
   return ORB_OK;
 }
@@ -360,7 +366,7 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
   if (status == ORB_OK && composes) {
     status = landmark_count > 0 && shape_count > 1
                  ? improve(ctx, shapes, landmarks, options, out)
-                 : orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, 0, options->preset);
+                 : orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset);
   }
   if (status == ORB_OK) {
     status = soften(ctx, landmarks, options->preset, out);
@@ -375,7 +381,7 @@ orb_status orb_align_pinned(orb_context *ctx, const orb_align_shape *shapes, int
                             const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                             orb_alignment *out) {
   ORB_TRY(create(ctx, shapes, shape_count, landmarks, landmark_count, options, out));
-  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, 0, options->preset);
+  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset);
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
   }

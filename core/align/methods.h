@@ -36,11 +36,18 @@ ORB_MUST_CHECK orb_status orb_align_pinned(orb_context *ctx, const orb_align_sha
                                            const orb_landmark *landmarks, int32_t landmark_count,
                                            const orb_align_options *options, orb_alignment *out);
 
+/* What the maps of all later shapes go to. */
+typedef struct orb_aims {
+  const double *const *targets; /* NULL, or for each shape but the first what orb_compose() takes */
+  int keep_angles;              /* the spheres of the shapes do */
+  double beat;                  /* as in orb_map_guide */
+  double *started;              /* likewise; of the last shape */
+} orb_aims;
+
 /* Improves the maps from the first shape to the others (orb_compose()), since aligned landmarks alone do not make a
- * good morph. Fills alignment->energy. targets: NULL, or for each shape but the first what orb_compose() takes.
- * keep_angles: the spheres of the shapes do. */
+ * good morph. Fills alignment->energy. aims: NULL for none. */
 ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,
-                                          const double *const *targets, int keep_angles, orb_preset preset);
+                                          const orb_aims *aims, orb_preset preset);
 
 /* Method `auto` without landmarks; auto.c describes it. The found landmarks and the confidence of the match are left to
  * the caller. */

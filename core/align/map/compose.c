@@ -346,6 +346,8 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
                    .landmark_count = landmark_count,
                    .given_target = guide->target,
                    .keeps_angles = guide->keeps_angles,
+                   .beat = guide->beat,
+                   .started = guide->started,
                    .springs = guide->springs,
                    .hopeless = INFINITY,
                    .twisted_energy = INFINITY};
@@ -382,7 +384,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
-    const int is_hopeless = c.given_target && c.best_energy > c.params.targets.hopeless;
+    const int is_hopeless = c.is_beaten || (c.given_target && c.best_energy > c.params.targets.hopeless);
     if (!is_hopeless && (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0])) {
       ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
     }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/iron.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/step.h"
 #include "align/map/starts/place.h"
@@ -153,6 +154,10 @@ orb_status orb_map_levels_finish(orb_map_run *c, orb_refiner *r, orb_map_level *
   int failed = 0;
   orb_map_level_store(c, l, r);
   ORB_TRY(orb_map_levels_refine(c, r, l, pull, rough, &failed));
+  if (!failed && c->given_target) {
+    ORB_TRY(orb_map_iron(c, l));
+    orb_map_level_store(c, l, r);
+  }
   const double energy = failed ? INFINITY : orb_map_level_energy(l);
   if (energy < c->best_energy) {
     c->best_energy = energy;

@@ -1,8 +1,10 @@
-/* Which few flips of a start cannot be cleared is close to chance, so there are four starts, one after the other, until
- * one is a map of shapes that correspond: from the targets, from the targets on two coarser levels, and from a
- * registration in space through samples of them, which is smoother. Then passes through samples of the best map, and a
- * draw, bring the energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no
- * pass helps, the map is drawn to the given targets.
+/* A start from the targets is nearly always a map: unfolding (engine/unfold.h) clears what flips are left. Where the
+ * targets were folded it has crumpled, in fingers and in the pockets of a face, and how much is close to chance. So it
+ * is drawn to the targets at once, which smooths most of it. Where that leads to no map of shapes that correspond,
+ * passes through samples of the best map follow, and then three more starts, until one is such a map: from the targets
+ * on two coarser levels, and from a registration in space through samples of them. Then passes and a draw bring the
+ * energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no pass helps, the
+ * map is drawn to the given targets.
  *
  * Where that comes to no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
  * and is optimised on a coarse level, so several are tried, and the best one is refined. Pairs of the match that are
@@ -57,17 +59,6 @@ done:
   return status;
 }
 
-static orb_status run_starts(orb_map_run *c) {
-  const orb_map_params *p = &c->params;
-  ORB_TRY(orb_map_register(c, 0));
-  ORB_TRY(orb_map_levels_prepare(c));
-  ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
-  for (int i = 0; i < 2 && c->best_energy > p->energy.poor; i++) {
-    ORB_TRY(start_coarser(c, p->level.given[i]));
-  }
-  return c->best_energy > p->energy.poor ? start_through_samples(c) : ORB_OK;
-}
-
 static orb_status draw(orb_map_run *c) {
   allow(c);
   return orb_map_run_start(c, ORB_MAP_DRAWN);
@@ -78,8 +69,40 @@ static orb_status run_passes(orb_map_run *c) {
   return orb_map_run_passes(c, 0);
 }
 
+/* The first start. */
+static orb_status run_first(orb_map_run *c) {
+  ORB_TRY(orb_map_register(c, 0));
+  ORB_TRY(orb_map_levels_prepare(c));
+  ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
+  c->is_beaten = c->beat > 0 && !(c->best_energy < c->beat);
+  if (c->started) {
+    *c->started = c->best_energy;
+  }
+  return ORB_OK;
+}
+
+/* What leads on from the first start, until there is a map of shapes that correspond. */
+static orb_status run_starts(orb_map_run *c) {
+  const orb_map_params *p = &c->params;
+  if (c->best_energy > p->energy.good && c->best_energy <= p->targets.crumpled) {
+    ORB_TRY(draw(c));
+  }
+  if (c->best_energy > p->energy.poor) {
+    ORB_TRY(run_passes(c));
+    ORB_TRY(orb_map_register(c, 0));
+  }
+  for (int i = 0; i < 2 && c->best_energy > p->energy.poor; i++) {
+    ORB_TRY(start_coarser(c, p->level.given[i]));
+  }
+  return c->best_energy > p->energy.poor ? start_through_samples(c) : ORB_OK;
+}
+
 orb_status orb_map_follow_targets(orb_map_run *c) {
   const orb_map_params *p = &c->params;
+  ORB_TRY(run_first(c));
+  if (c->is_beaten) {
+    return ORB_OK;
+  }
   ORB_TRY(run_starts(c));
   double started = c->best_energy;
   if (started <= p->energy.good || started > p->targets.hopeless) {

@@ -39,6 +39,9 @@ typedef struct orb_map_guide {
                            replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
   int keeps_angles;     /* the spheres do (sheet/even.h); then embeddings made on the way do as well, and the places of
                            the targets are smoothed */
+  double beat;          /* with a target: unless the first start has less energy than this, it is the last. 0: it never
+                           is */
+  double *started;      /* with a target: NULL, or set to the energy after the first start */
   orb_map_springs springs; /* with ORB_MAP_FROM_PINS and ORB_MAP_FROM_COPY */
   orb_map_level_map copy;  /* with ORB_MAP_FROM_COPY */
 } orb_map_guide;

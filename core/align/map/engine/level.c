@@ -283,6 +283,54 @@ int orb_map_level_covers_once(const orb_map_level *l) {
   return area < 6 * M_PI; /* it is a multiple of 4π */
 }
 
+/* Symmetric Dirichlet energy of the triangle of a spoke of v; 1: isometric. */
+static double triangle_energy(const orb_map_level *l, int32_t v, const orb_map_spoke *s) {
+  const double *y = l->y + 3 * (size_t)v, *q = l->y + 3 * (size_t)s->q, *r = l->y + 3 * (size_t)s->r;
+  double u[3], w[3], cross[3], normal[3];
+  orb_sub(q, y, u);
+  orb_sub(r, y, w);
+  orb_cross(u, w, cross);
+  for (int k = 0; k < 3; k++) {
+    normal[k] =
+        l->n[3 * (size_t)v + (size_t)k] + l->n[3 * (size_t)s->q + (size_t)k] + l->n[3 * (size_t)s->r + (size_t)k];
+  }
+  double signed_area = 0.5 * orb_dot(cross, normal) / (orb_length(normal) + 1e-300);
+  double dirichlet = 0.5 * (s->cv * orb_distance2(q, r) + s->cq * orb_dot(w, w) + s->cr * orb_dot(u, u));
+  double ratio = signed_area > 0 ? s->area / signed_area : INFINITY;
+  return dirichlet * (1 + ratio * ratio) / (4 * s->area);
+}
+
+int32_t orb_map_level_mark_above(const orb_map_level *l, double limit, unsigned char *mark) {
+  int32_t count = 0;
+  memset(mark, 0, (size_t)l->count);
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+      const orb_map_spoke *s = &l->spoke[i];
+      if (v < s->q && v < s->r && !(triangle_energy(l, v, s) <= limit)) {
+        mark[v] = mark[s->q] = mark[s->r] = 1;
+        count++;
+      }
+    }
+  }
+  return count;
+}
+
+void orb_map_level_part_energies(const orb_map_level *l, const int32_t *part, int32_t parts, double *energy) {
+  const double cap = l->params->energy.cap;
+  memset(energy, 0, (size_t)parts * sizeof *energy);
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+      const orb_map_spoke *s = &l->spoke[i];
+      const int32_t one = part[v] > part[s->q] ? part[v] : part[s->q], all = one > part[s->r] ? one : part[s->r];
+      if (all < 0 || v > s->q || v > s->r) {
+        continue;
+      }
+      const int flipped = orb_orient(l->x + 3 * (size_t)v, l->x + 3 * (size_t)s->q, l->x + 3 * (size_t)s->r) <= 0;
+      energy[all] += flipped ? INFINITY : s->area * fmin(cap, triangle_energy(l, v, s));
+    }
+  }
+}
+
 double orb_map_level_energy(const orb_map_level *l) {
   const double cap = l->params->energy.cap;
   double energy = 0, weight = 0;
@@ -292,19 +340,7 @@ double orb_map_level_energy(const orb_map_level *l) {
       if (v > s->q || v > s->r) {
         continue; /* each triangle once */
       }
-      const double *y = l->y + 3 * (size_t)v, *q = l->y + 3 * (size_t)s->q, *r = l->y + 3 * (size_t)s->r;
-      double u[3], w[3], cross[3], normal[3];
-      orb_sub(q, y, u);
-      orb_sub(r, y, w);
-      orb_cross(u, w, cross);
-      for (int k = 0; k < 3; k++) {
-        normal[k] =
-            l->n[3 * (size_t)v + (size_t)k] + l->n[3 * (size_t)s->q + (size_t)k] + l->n[3 * (size_t)s->r + (size_t)k];
-      }
-      double signed_area = 0.5 * orb_dot(cross, normal) / (orb_length(normal) + 1e-300);
-      double dirichlet = 0.5 * (s->cv * orb_distance2(q, r) + s->cq * orb_dot(w, w) + s->cr * orb_dot(u, u));
-      double ratio = signed_area > 0 ? s->area / signed_area : INFINITY;
-      double value = dirichlet * (1 + ratio * ratio) / (4 * s->area);
+      const double value = triangle_energy(l, v, s);
       energy += s->area * (value < cap ? value : cap);
       weight += s->area;
     }

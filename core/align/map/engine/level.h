@@ -83,6 +83,14 @@ int32_t orb_map_level_flips(const orb_map_level *level);
  * twice, with every triangle positive. */
 int orb_map_level_covers_once(const orb_map_level *level);
 
+/* Marks the vertices of the triangles whose symmetric Dirichlet energy is above a limit, and clears the other marks.
+ * Returns the number of these triangles. */
+int32_t orb_map_level_mark_above(const orb_map_level *level, double limit, unsigned char *mark);
+
+/* The summed energy of the triangles of each part, capped for each triangle and times its area; INFINITY where one is
+ * flipped. part: of each vertex, −1: none; a triangle has vertices of one part and of none. */
+void orb_map_level_part_energies(const orb_map_level *level, const int32_t *part, int32_t parts, double *energy);
+
 /* Symmetric Dirichlet energy of the composed map, capped for each triangle and weighted by area; 1: isometric. */
 double orb_map_level_energy(const orb_map_level *level);
 

@@ -23,6 +23,7 @@ enum {
   ORB_MAP_SPECTRAL_SAMPLES = 48, /* at most; as many as orb_spectral_find() has */
   ORB_MAP_LIMBS = 12,            /* rotated parts of a surface that are examined for a twist, the largest first */
   ORB_MAP_BANDS = 16,            /* rings of a limb: more resolve the twist better, fewer have more vertices each */
+  ORB_MAP_IRON_ROUNDS = 4,       /* of ironing, each of other parts */
   ORB_MAP_GUIDED = 6,            /* guided walks; one takes 0.1 to 0.4 s on its coarse level */
   ORB_MAP_CROSSINGS = 400,       /* edges that one step of a vertex crosses at most; a guard against rounding */
   ORB_MAP_RING_CROSSINGS = 8192  /* the same for a ring around a limb */
@@ -93,6 +94,7 @@ typedef struct orb_map_params {
   struct {
     int work;        /* least that each step after the first has, as work.all: a start that is given up takes some */
     double hopeless; /* energy of a start above which nothing else is tried */
+    double crumpled; /* energy of the first start up to which it is drawn at once */
     double drawn;    /* above which the map is not drawn: it stays caught */
     double gain;     /* a draw below this share of the energy before it opens the way for one more pass, */
     double enough;   /* unless the energy is below this, where a pass gains 1 % or less */
@@ -152,8 +154,6 @@ typedef struct orb_map_params {
   /* Clearing flips: rounds of sweeps against a growing barrier, then untangling. */
   struct {
     int32_t hopeless;      /* one flip in fewer triangles than this: the start is given up */
-    int32_t unfold;        /* at most one flip in so many triangles is unfolded where untangling has left it. More are
-                              large folds, and unfolding them loses the map */
     int rounds;            /* of a start */
     int sweeps;            /* of a round */
     double first_barrier;  /* strength in the first round. A weak one lets triangles pass each other */
@@ -180,6 +180,18 @@ typedef struct orb_map_params {
                                      determinant, added */
     double convexity;             /* least eigenvalue of the Hessian relative to the greatest, as in a step */
   } untangle;
+
+  /* Setting crumpled parts of a map anew. */
+  struct {
+    struct {
+      double crumpled; /* energy above which a triangle is set anew, */
+      int rings;       /* with so many rings around it. Which are best differs from part to part */
+    } round[ORB_MAP_IRON_ROUNDS];
+    double enough; /* energy of a map that is not ironed */
+    double gain;   /* of the energy, relative: a round that gains less is the last */
+    int sweeps;    /* of a round, */
+    int loosen;    /* and of its loosening */
+  } iron;
 
   /* Drawing a level without flips to its spatial targets. */
   struct {
@@ -274,14 +286,16 @@ typedef struct orb_map_params {
     double given_jitter;  /* the same for targets that are given: few of them share a point */
   } place;
 
-  /* Smoothing of places on the sphere. Chosen on eight pairs of posed people of the half `choose` of
+  /* Smoothing of places on the sphere. Chosen on the 20 pairs of posed people of the half `choose` of
      tests/bench/correspond.py. */
   struct {
-    int rounds;             /* of weighing the targets; with more, whole limbs let go of theirs */
+    int rounds;             /* of weighing the targets */
     int sweeps;             /* of a round */
     double over;            /* over-relaxation of the sweeps */
-    double reach;           /* a vertex follows its neighbours within this distance: more than the noise, less than
-                               the girth of a limb */
+    double reach;           /* a vertex follows its neighbours within this distance. Three times as much draws arms
+                               towards their shoulders, which are larger on the sphere */
+    double folded;          /* factor on the trust in the target of a vertex of a flipped triangle, in each round.
+                               Smaller ones let whole limbs go, 1 leaves the pockets of faces folded */
     double outlier;         /* distance from its target at which a vertex counts a quarter */
     double least_cotangent; /* of an edge: obtuse triangles would push their neighbours away, */
     double most_cotangent;  /* and flat ones would hold them */

@@ -99,9 +99,13 @@ static orb_status reserve(orb_context *ctx, sweep_run *s) {
                                                                                                    : ORB_E_NO_MEMORY;
 }
 
-/* Has anything around v moved since v was last optimal? */
+/* Has anything around v moved since v was last optimal? Vertices that were pinned after the level was made have a
+ * colour, but stay. */
 static int is_stirred(const orb_map_step_job *j, int32_t v) {
   const orb_map_level *l = j->level;
+  if (l->pinned[v]) {
+    return 0;
+  }
   int stirred = l->moved[v] > j->rules->still;
   for (int32_t i = l->start[v]; i < l->start[v + 1] && !stirred; i++) {
     stirred = l->moved[j->ring[i]] > j->rules->still;

@@ -4,9 +4,14 @@
  * triangles from a vertex of its own, its kernel is not empty, and the collapsed vertex can always come back into it.
  * So vertices of flipped triangles are collapsed until no flip is left; then they come back in reverse order. Where no
  * collapse lowers the number of flips, one that keeps it removes a vertex of the fold all the same. Nothing moves but
- * the vertices that were collapsed, and of those only the ones that have left their kernels.
+ * the vertices that were collapsed and their rings. As soon as a vertex is back, it and its ring move towards their
+ * places from before, or, where they are cramped, to the middles of their rings: kernels inside kernels shrink fast,
+ * and without these moves doubles cannot hold what comes back into a large fold.
  *
- * An optimiser (untangle.h) leaves better triangles, but it can end with a few flips that it never clears.
+ * Source: Shen, Jiang, Zorin & Panozzo 2019, "Progressive embedding" (collapse until nothing is flipped, and optimise
+ * around each vertex that comes back).
+ *
+ * An optimiser (untangle.h) leaves better triangles, but it can end with flips that it never clears.
  */
 #include "align/map/engine/unfold.h"
 
@@ -29,7 +34,12 @@ enum allowed {
   EQUAL, /* of vertices of flipped triangles, those that do not raise it */
   THIN   /* of all vertices: where fewer are left, folds are simpler */
 };
-static const double WELL_INSIDE = 0.02; /* least determinant of a triangle over its squared edge on the ring */
+/* Least determinants of a triangle over its squared edge on the ring: a vertex there comes back where it was; a vertex
+ * with more than the second may move so far. The first is what doubles hold with ease, the second a fifth of an
+ * equilateral triangle. */
+static const double WELL_INSIDE = 0.02, SEATED = 0.1;
+static const double GAIN = 1.02;      /* a cramped vertex moves where that raises its least determinant so much */
+enum { HALVINGS = 3, RELAXINGS = 2 }; /* of a way that is tried; of a ring around a vertex that is back */
 
 typedef struct collapse {
   int32_t vertex, first, count; /* its ring: entries of `ring` */
@@ -44,7 +54,8 @@ typedef struct unfolding {
   unsigned char *queued;
   collapse *done;
   int32_t done_count;
-  int32_t *ring, ring_count, ring_capacity;
+  int32_t *ring, *spoke, ring_count, ring_capacity; /* spoke: the half-edge to each entry of `ring` */
+  const double *home; /* where the vertices were, 3 each; NULL: they do not return there */
   int32_t flips;
 } unfolding;
 
@@ -125,6 +136,7 @@ static void apply(unfolding *u, int32_t v, const int32_t *star, int count, int k
   u->done[u->done_count++] = (collapse){v, u->ring_count, count};
   for (int i = 0; i < count; i++) {
     int32_t a = end_of(u, star[(k + i) % count]);
+    u->spoke[u->ring_count] = star[(k + i) % count];
     u->ring[u->ring_count++] = a;
     ask(u, a);
   }
@@ -142,6 +154,24 @@ static void apply(unfolding *u, int32_t v, const int32_t *star, int count, int k
   u->corner[a1] = right_out;
   u->corner[an] = left_in;
   u->corner[v] = -1;
+}
+
+/* Undoes a collapse. The triangles that went know their neighbours still. */
+static void split(unfolding *u, const collapse *c) {
+  const int32_t *spoke = u->spoke + c->first, *ring = u->ring + c->first;
+  const int32_t first = spoke[0], last = spoke[c->count - 1];
+  for (int32_t i = 1; i + 1 < c->count; i++) {
+    u->triangle[spoke[i]] = c->vertex;
+  }
+  join(u, u->twin[orb_next(first)], orb_next(first));
+  join(u, u->twin[orb_prev(first)], orb_prev(first));
+  join(u, u->twin[orb_next(last)], orb_next(last));
+  join(u, u->twin[last], last);
+  u->gone[first / 3] = u->gone[last / 3] = 0;
+  u->corner[c->vertex] = first;
+  u->corner[ring[0]] = orb_next(first);
+  u->corner[ring[1]] = orb_prev(first);
+  u->corner[ring[c->count - 1]] = orb_next(last);
 }
 
 /* Collapses v if `allowed`. Returns whether it did. */
@@ -234,6 +264,70 @@ static int is_inside(const double (*ring)[3], int32_t count, const double p[3]) 
   return 1;
 }
 
+/* How well a star sees the point p: its least determinant over squared edge. Not positive: p flips a triangle. */
+static double seat_of(const unfolding *u, const int32_t *star, int count, const double p[3]) {
+  double least = INFINITY;
+  for (int i = 0; i < count; i++) {
+    const double *a = at(u, end_of(u, star[i])), *b = at(u, end_of(u, star[(i + 1) % count]));
+    least = fmin(least, orb_det(p, a, b) / orb_distance2(a, b));
+  }
+  return least;
+}
+
+/* Decided exactly. */
+static int flips_nothing(const unfolding *u, const int32_t *star, int count, const double p[3]) {
+  for (int i = 0; i < count; i++) {
+    if (orb_orient(p, at(u, end_of(u, star[i])), at(u, end_of(u, star[(i + 1) % count]))) <= 0) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* Moves v towards a point as far as its star sees it: at least with `enough`, or better than now. */
+static int approach(unfolding *u, int32_t v, const int32_t *star, int count, const double to[3], double enough) {
+  double *x = u->l->x + 3 * (size_t)v, share = 1;
+  const double now = seat_of(u, star, count, x);
+  for (int i = 0; i < HALVINGS; i++, share /= 2) {
+    double p[3];
+    for (int k = 0; k < 3; k++) {
+      p[k] = x[k] + share * (to[k] - x[k]);
+    }
+    orb_normalize(p);
+    const double there = seat_of(u, star, count, p);
+    if ((there >= enough || there > GAIN * now) && flips_nothing(u, star, count, p)) {
+      memcpy(x, p, sizeof p);
+      return 1;
+    }
+  }
+  return 0;
+}
+
+/* Moves v home as far as its star sees it well, or else, if it is cramped, towards the middle of its ring. */
+static void relax(unfolding *u, int32_t v) {
+  int32_t star[RING_MOST];
+  double middle[3] = {0};
+  const int count = u->l->pinned[v] ? 0 : star_of(u, v, star);
+  if (count < 3 || (u->home && approach(u, v, star, count, u->home + 3 * (size_t)v, SEATED)) ||
+      seat_of(u, star, count, at(u, v)) >= SEATED) {
+    return;
+  }
+  for (int i = 0; i < 3 * count; i++) {
+    middle[i % 3] += at(u, end_of(u, star[i / 3]))[i % 3] / count;
+  }
+  (void)approach(u, v, star, count, middle, INFINITY);
+}
+
+/* Relaxes a vertex that is back, and its ring. */
+static void relax_around(unfolding *u, const collapse *c) {
+  for (int i = 0; i < RELAXINGS; i++) {
+    relax(u, c->vertex);
+    for (int32_t k = 0; k < c->count; k++) {
+      relax(u, u->ring[c->first + k]);
+    }
+  }
+}
+
 /* The collapsed vertices come back, the last one first. */
 static orb_status bring_back(unfolding *u, int *all) {
   orb_kernel_room room = {0};
@@ -246,11 +340,13 @@ static orb_status bring_back(unfolding *u, int *all) {
       memcpy(ring[k], at(u, u->ring[c->first + k]), sizeof ring[k]);
     }
     memcpy(p, at(u, c->vertex), sizeof p);
-    if (!is_inside((const double(*)[3])ring, c->count, p)) {
+    if (!u->home || !is_inside((const double(*)[3])ring, c->count, p)) {
       status = orb_kernel_point(u->ctx, &room, (const double(*)[3])ring, c->count, p, all);
     }
     if (status == ORB_OK && *all) {
       memcpy(u->l->x + 3 * (size_t)c->vertex, p, sizeof p);
+      split(u, c);
+      relax_around(u, c);
     }
   }
   orb_kernel_room_free(u->ctx, &room);
@@ -270,7 +366,9 @@ static orb_status build(unfolding *u) {
   u->done = ORB_NEW(u->ctx, collapse, n);
   u->ring_capacity = 16 * l->count;
   u->ring = ORB_NEW(u->ctx, int32_t, u->ring_capacity);
-  if (!u->triangle || !u->twin || !u->corner || !u->gone || !u->queue || !u->queued || !u->done || !u->ring) {
+  u->spoke = ORB_NEW(u->ctx, int32_t, u->ring_capacity);
+  if (!u->triangle || !u->twin || !u->corner || !u->gone || !u->queue || !u->queued || !u->done || !u->ring ||
+      !u->spoke) {
     return ORB_E_NO_MEMORY;
   }
   memcpy(u->triangle, l->triangle, h * sizeof *u->triangle);
@@ -279,6 +377,18 @@ static orb_status build(unfolding *u) {
     u->corner[u->triangle[i]] = (int32_t)i;
   }
   return ORB_OK;
+}
+
+static void unfolding_free(unfolding *u) {
+  orb_free(u->ctx, u->triangle);
+  orb_free(u->ctx, u->twin);
+  orb_free(u->ctx, u->corner);
+  orb_free(u->ctx, u->gone);
+  orb_free(u->ctx, u->queue);
+  orb_free(u->ctx, u->queued);
+  orb_free(u->ctx, u->done);
+  orb_free(u->ctx, u->ring);
+  orb_free(u->ctx, u->spoke);
 }
 
 orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *l, int32_t *left) {
@@ -292,6 +402,7 @@ orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *l, int32_t *lef
     goto done;
   }
   memcpy(before, l->x, size);
+  u.home = before;
   ORB_GO(status, build(&u), done);
   for (int32_t t = 0; t < l->triangle_count; t++) {
     const int32_t *v = u.triangle + 3 * (size_t)t;
@@ -310,13 +421,35 @@ orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *l, int32_t *lef
   }
 done:
   orb_free(ctx, before);
-  orb_free(ctx, u.triangle);
-  orb_free(ctx, u.twin);
-  orb_free(ctx, u.corner);
-  orb_free(ctx, u.gone);
-  orb_free(ctx, u.queue);
-  orb_free(ctx, u.queued);
-  orb_free(ctx, u.done);
-  orb_free(ctx, u.ring);
+  unfolding_free(&u);
+  return status;
+}
+
+orb_status orb_map_level_set_anew(orb_context *ctx, orb_map_level *l, const unsigned char *mark) {
+  unfolding u = {.ctx = ctx, .l = l};
+  size_t size = 3 * (size_t)l->count * sizeof(double);
+  double *before = ORB_NEW(ctx, double, 3 * (size_t)l->count);
+  int all = 0, any = 1;
+  orb_status status = before ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  memcpy(before, l->x, size);
+  ORB_GO(status, build(&u), done);
+  while (any) {
+    any = 0;
+    for (int32_t v = 0; v < l->count; v++) {
+      any |= mark[v] && try_vertex(&u, v, THIN);
+    }
+    u.queue_count = 0;
+    memset(u.queued, 0, (size_t)l->count);
+  }
+  ORB_GO(status, bring_back(&u, &all), done);
+  if (!all) {
+    memcpy(l->x, before, size);
+  }
+done:
+  orb_free(ctx, before);
+  unfolding_free(&u);
   return status;
 }

@@ -133,7 +133,7 @@ static int32_t mark_flips(orb_context *ctx, flip_job *job, unsigned char *mark, 
   return flips;
 }
 
-static void grow_marks(const orb_map_level *l, int rings, unsigned char *mark, unsigned char *next) {
+void orb_map_level_grow_marks(const orb_map_level *l, int rings, unsigned char *mark, unsigned char *next) {
   for (int ring = 0; ring < rings; ring++) {
     memcpy(next, mark, (size_t)l->count);
     for (int32_t t = 0; t < l->triangle_count; t++) {
@@ -154,7 +154,7 @@ orb_status orb_map_level_mark_flips(orb_context *ctx, const orb_map_level *l, in
     return ORB_E_NO_MEMORY;
   }
   (void)mark_flips(ctx, &job, mark, &worst);
-  grow_marks(l, rings, mark, next);
+  orb_map_level_grow_marks(l, rings, mark, next);
   orb_free(ctx, job.flipped);
   return ORB_OK;
 }
@@ -270,7 +270,7 @@ orb_status orb_map_level_untangle(orb_context *ctx, orb_map_level *l, int32_t *l
       break;
     }
     int rings = 1 + round / 4;
-    grow_marks(l, rings < params->untangle.rings_most ? rings : params->untangle.rings_most, mark, next);
+    orb_map_level_grow_marks(l, rings < params->untangle.rings_most ? rings : params->untangle.rings_most, mark, next);
     /* Many flips need one ε for all; the last few hide in stars that are far smaller. */
     double scale = 1.0 / l->triangle_count;
     is.least_epsilon =

@@ -1,6 +1,8 @@
 /* Minimises ∫ |∇x|² + trust · |x − target|² / reach² over the moving shape by over-relaxed Gauss–Seidel sweeps, where x
- * is the point on the sphere; then trusts each target by how far x has moved from it, measured on the fixed shape; and
- * so on (iteratively reweighted least squares). Between the rounds x is not normalised: it stays near the sphere. */
+ * is the point on the sphere; then trusts each target by how far x has moved from it, measured on the fixed shape, and
+ * less where triangles are flipped; and so on (iteratively reweighted least squares). So a fold is smoothed over a
+ * growing distance until it is none, and all other places stay where they are. Between the rounds x is not normalised:
+ * it stays near the sphere. */
 #include "align/map/starts/smooth.h"
 
 #include <math.h>
@@ -9,6 +11,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
+#include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
 typedef struct smoothing {
@@ -16,6 +19,7 @@ typedef struct smoothing {
   const orb_map_params *params;
   double *target; /* 3 a vertex: where it was placed, on the sphere */
   double *trust;  /* 0 to 1 */
+  double *smooth; /* likewise: how long a vertex has been without flips */
 } smoothing;
 
 static double bounded(const smoothing *s, double cotangent) {
@@ -44,6 +48,20 @@ static void relax(const smoothing *s, int32_t v) {
   }
 }
 
+/* Trusts the targets of flipped triangles less. */
+static void doubt_folds(const smoothing *s) {
+  const orb_map_level *l = s->level;
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+      const orb_map_spoke *spoke = &l->spoke[i];
+      if (orb_orient(l->x + 3 * (size_t)v, l->x + 3 * (size_t)spoke->q, l->x + 3 * (size_t)spoke->r) <= 0) {
+        s->smooth[v] *= s->params->smooth.folded;
+        break;
+      }
+    }
+  }
+}
+
 /* Trusts the targets anew. The density of the fixed shape takes distances on the sphere to distances on that shape. */
 static void weigh(const smoothing *s) {
   const orb_map_level *l = s->level;
@@ -52,7 +70,7 @@ static void weigh(const smoothing *s) {
     const double far2 = orb_distance2(l->x + 3 * (size_t)v, s->target + 3 * (size_t)v);
     const double scale2 = fmax(l->density[v], 1e-300); /* not 0 where the fixed shape has a flat triangle */
     const double share = 1 / (1 + far2 / (scale2 * outlier * outlier));
-    s->trust[v] = share * share;
+    s->trust[v] = share * share * s->smooth[v];
   }
 }
 
@@ -61,14 +79,15 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l) {
   smoothing s = {.level = l,
                  .params = p,
                  .target = ORB_NEW(c->ctx, double, 3 * (size_t)l->count),
-                 .trust = ORB_NEW(c->ctx, double, l->count)};
-  orb_status status = s.target && s.trust ? ORB_OK : ORB_E_NO_MEMORY;
+                 .trust = ORB_NEW(c->ctx, double, l->count),
+                 .smooth = ORB_NEW(c->ctx, double, l->count)};
+  orb_status status = s.target && s.trust && s.smooth ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     goto done;
   }
   memcpy(s.target, l->x, 3 * (size_t)l->count * sizeof *s.target);
   for (int32_t v = 0; v < l->count; v++) {
-    s.trust[v] = 1;
+    s.trust[v] = s.smooth[v] = 1;
   }
   for (int round = 0; round < p->smooth.rounds; round++) {
     for (int sweep = 0; sweep < p->smooth.sweeps; sweep++) {
@@ -79,6 +98,7 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l) {
       }
       ORB_GO(status, orb_context_check(c->ctx), done);
     }
+    doubt_folds(&s);
     weigh(&s);
   }
   for (int32_t v = 0; v < l->count; v++) {
@@ -90,5 +110,6 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l) {
 done:
   orb_free(c->ctx, s.target);
   orb_free(c->ctx, s.trust);
+  orb_free(c->ctx, s.smooth);
   return status;
 }

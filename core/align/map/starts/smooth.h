@@ -9,7 +9,8 @@
 #include "align/map/engine/run.h"
 
 /* Moves the vertices of a level that are not pinned to where their targets and their neighbours draw them, and locates
- * them there. Targets that most neighbours contradict count less from round to round. O(vertices), one thread. */
+ * them there. Targets that most neighbours contradict, and those of flipped triangles, count less from round to round.
+ * O(vertices), one thread. */
 ORB_MUST_CHECK orb_status orb_map_smooth(orb_map_run *run, orb_map_level *level);
 
 #endif
