@@ -57,11 +57,8 @@ static double diagonal_of(const orb_mesh *mesh, double *facing) {
 
 static double area_of(const orb_mesh *mesh, int32_t t) {
   const int32_t *c = mesh->triangles + 3 * (size_t)t;
-  double u[3], w[3], n[3];
-  orb_sub(mesh->positions + 3 * (size_t)c[1], mesh->positions + 3 * (size_t)c[0], u);
-  orb_sub(mesh->positions + 3 * (size_t)c[2], mesh->positions + 3 * (size_t)c[0], w);
-  orb_cross(u, w, n);
-  return 0.5 * orb_length(n);
+  return orb_triangle_area(mesh->positions + 3 * (size_t)c[0], mesh->positions + 3 * (size_t)c[1],
+                           mesh->positions + 3 * (size_t)c[2]);
 }
 
 /* Whether the patches of a loop lie outside the body: the surface then faces the loop's centre. */
