@@ -10,7 +10,7 @@
 /* Reads the list. out: room for ORB_CARRY_MAX. Returns 1, or 0 with *problem filled. */
 int api_transfer_read(const cJSON *list, int32_t shape_count, orb_carry *out, int32_t *count, api_problem *problem);
 
-/* A list as a URL has it, such as "1:skin,2:texture:2048", as the member "transfer". What is no number stays text,
+/* A list as a URL has it, such as "1:skin,2:texture:2048", as the member "transfer". What is not a number stays text,
  * which api_transfer_read() refuses. NULL: the memory is spent. */
 cJSON *api_transfer_parse(const char *list);
 

@@ -141,7 +141,7 @@ static void keep_budget(const server *srv, int64_t *seen, int *over) {
   const int64_t budget = srv->options->derived_bytes;
   const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
   evict_held(&env);
-  if (budget <= 0 || !queue_keeps_house(srv->q)) {
+  if (budget <= 0 || !queue_does_housekeeping(srv->q)) {
     return;
   }
   int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED) + __atomic_load_n(&srv->profiles_made, __ATOMIC_RELAXED);
@@ -166,7 +166,7 @@ typedef struct ended_jobs {
 static void keep_jobs(const server *srv, ended_jobs *jobs) {
   const int64_t keep = srv->options->keep_jobs;
   int64_t since = 0;
-  if (keep <= 0 || !queue_keeps_house(srv->q)) {
+  if (keep <= 0 || !queue_does_housekeeping(srv->q)) {
     return;
   }
   if (config_is_shared(srv->options) && orb_clock_ms() - jobs->at >= RECOUNT_MS) { /* jobs end on other nodes, too */
@@ -341,12 +341,12 @@ static void on_shared_change(void *user, const char *what) {
   }
 }
 
-static int keeps_house(void *q) {
-  return queue_keeps_house(q);
+static int may_deliver(void *q) {
+  return queue_does_housekeeping(q);
 }
 
 static int start_outbox(server *srv, deliver_options *options) {
-  options->may = keeps_house;
+  options->may = may_deliver;
   options->user = srv->q;
   srv->outbox = deliver_start(options, srv->cat);
   if (srv->outbox) {

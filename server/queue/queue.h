@@ -16,7 +16,7 @@
  * The retry of a job. A job that fails is not retried. The queue runs a job again in two cases. After the store fails,
  * queue_finish(), queue_give_back() and queue_put_off() in finish.c and queue_wait_for() in dependencies.c set
  * retry_at, before which schedule.c does not choose the job. After the job's process dies, queue_crashed() in finish.c
- * counts the death and queues the job again, until it has died MOST_CRASHES times. With isolate = off the daemon dies,
+ * counts the death and queues the job again, until it has died CRASHES_MOST times. With isolate = off the daemon dies,
  * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts. Of
  * several nodes (shared.h), the others do that for one that fell silent: catalogue_recover_lost() in store/jobs.c. New
  * requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
@@ -52,8 +52,6 @@
 /* A priority is QUEUE_URGENCIES · class + urgency. Classes come from tokens and order all jobs; urgencies order the
  * jobs of one owner. */
 enum { QUEUE_URGENCIES = 8 };
-
-enum { MOST_CRASHES = CRASHES_MOST }; /* of a job, alone */
 
 typedef struct queue queue;
 typedef struct job job;
@@ -137,7 +135,7 @@ job *queue_find(queue *q, const char *id); /* NULL: not in memory, or another no
  * exist. */
 job *queue_follow(queue *q, const char *id);
 /* Whether this process does what only one node may do. */
-int queue_keeps_house(queue *q);
+int queue_does_housekeeping(queue *q);
 void queue_release(queue *q, job *j);
 
 const char *job_id(const job *j);
@@ -224,7 +222,7 @@ void queue_put_off(queue *q, job *j);
 /* Returns a taken job; its attempt does not count. */
 void queue_give_back(queue *q, job *j);
 /* The process of a claimed job died. Its attempt counts. Returns 0 if the job is queued again; the worker's reference
- * is released. 1: it has died MOST_CRASHES times; the worker must end it. is_sure: the job alone can be the cause; else
+ * is released. 1: it has died CRASHES_MOST times; the worker must end it. is_sure: the job alone can be the cause; else
  * it runs alone next time. */
 int queue_crashed(queue *q, job *j, int is_sure);
 int queue_runs_alone(queue *q, job *j);

@@ -19,8 +19,8 @@ typedef struct object_lock object_lock;
 
 object_lock *object_lock_open(const char *url); /* NULL: it cannot be opened */
 void object_lock_close(object_lock *l);         /* NULL: nothing */
-/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is away; to be
- * given back nevertheless. */
+/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is unreachable; to
+ * be given back nevertheless. */
 int object_lock_share(object_lock *l);
 void object_lock_unshare(object_lock *l);
 /* The number that this thread's sharing began with; 0: this thread shares no lock. */
@@ -29,7 +29,7 @@ int64_t object_lock_number(void);
  * began to share it with this number (0: SQL_OK), and nobody deletes before the end of the transaction. SQL_LOST: it
  * has not. */
 int object_lock_check(database *db, int64_t number);
-/* 0: not taken, because others hold it for long, or the database is away. */
+/* 0: not taken, because others hold it for long, or the database is unreachable. */
 int object_lock_exclude(object_lock *l);
 void object_lock_let_go(object_lock *l);
 /* Of who excludes others: announces a deletion. 0: the lock was lost, nothing may be deleted. object_lock_let_go()

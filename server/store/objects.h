@@ -86,15 +86,15 @@ int objects_link(const objects *store, object_kind kind, const char *id, long se
 /* The name of an object in a bucket. */
 enum { OBJECT_NAME = 100 };
 void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]);
-/* id: within the name. 0: it is no name of an object. */
+/* id: within the name. 0: it is not a name of an object. */
 int objects_read_name(const char *name, object_kind *kind, const char **id);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
 /* Makes the folder of that file, if it is not there. */
 store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
-/* Deletes an object that no row names; called while others are excluded. While a backup runs, S3 is away, or others are
- * excluded no more, it stays until objects_delete_held(). */
+/* Deletes an object that no row names; called while others are excluded. While a backup runs, S3 is unreachable, or
+ * others are excluded no more, it stays until objects_delete_held(). */
 store_result objects_delete(objects *store, object_kind kind, const char *id);
 /* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named:
  * whether a row names the object again; called while other threads are excluded. After a restart of the process the

@@ -155,8 +155,8 @@ static int begin(connection *c) {
 /* Whether the last connection that was tried could not be made. __atomic; of all connections of the process. */
 static int away;
 
-/* A connection that the network swallows fails only after seconds: while the server is away, one caller tries at a
- * time.
+/* A connection that the network swallows fails only after seconds: while the server is unreachable, one caller tries at
+ * a time.
  */
 enum { AGAIN_MS = 500 };
 static int64_t tried; /* when a connection was last tried in vain; __atomic */

@@ -128,7 +128,7 @@ static void test_placement(void **state) {
   assert_string_equal(mesh.objects[1].name, "right");
   assert_int_equal(mesh.objects[1].first_triangle, 4);
   check_extent(&mesh, 8, 2.0 / 6, 0, 10);
-  /* no build: each object that is no component, once */
+  /* no build: each object that is not a component, once */
   mesh = read_model("><resources>" OBJECT(1, "") "<object id=\"2\"><components><component objectid=\"1\"/>"
                                                  "</components></object></resources><build/>",
                     NULL);

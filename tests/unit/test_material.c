@@ -107,7 +107,7 @@ static void test_members_are_read(void **state) {
   orb_mesh_free(ctx, &copy);
 }
 
-/* Members that say the default, or have no effect, are no values. */
+/* Members that say the default, or have no effect, are not values. */
 static void test_defaults_are_no_values(void **state) {
   (void)state;
   orb_mesh mesh;
