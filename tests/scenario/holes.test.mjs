@@ -163,7 +163,7 @@ function piecesOf({ positions, triangles }) {
   return [...pieces.values()].sort((a, b) => b.length - a.length).map((list) => ({ positions, triangles: list }));
 }
 
-/** The problem of an open mesh that is no surface with its holes filled, by index.csv, and who is at fault. */
+/** The problem of an open mesh that is not a surface with its holes filled, by index.csv, and who is at fault. */
 function refusalOf(row) {
   if (/^NaN/.test(row.reason)) return ['not-finite', 'vertices'];
   if (row.orientable === 'False') return ['not-orientable', 'edges'];

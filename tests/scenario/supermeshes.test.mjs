@@ -44,7 +44,7 @@ async function check(d, supermesh, sources, landmarks) {
       morph,
       at.map((place, s) => sources[s].positions[place.vertex]),
     );
-    assert.ok(vertex >= 0, `landmark ${name} is no vertex of the supermesh`);
+    assert.ok(vertex >= 0, `landmark ${name} is not a vertex of the supermesh`);
     used.add(topology.weld[vertex]);
   }
   assert.equal(used.size, landmarks?.length ?? 0);

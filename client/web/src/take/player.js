@@ -394,7 +394,7 @@ function frameOf(primitives, shapes) {
 /**
  * Opens a morph on a canvas. settings: shapes (their number), tints (colours of shapes without material), seconds a
  * shape, easing, loop ("pingpong" or "loop"), variant of the materials (-1: those of the primitives), extras (targets of
- * the primitives that are no shapes, with weights), and the camera: yaw, pitch, distance, panX, panY.
+ * the primitives that are not shapes, with weights), and the camera: yaw, pitch, distance, panX, panY.
  */
 export async function open(canvas, glb, settings) {
   const gl = canvas.getContext('webgl2', { antialias: true, alpha: true, preserveDrawingBuffer: true });
