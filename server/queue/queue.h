@@ -17,13 +17,13 @@
  * queue_finish(), queue_give_back() and queue_put_off() in finish.c and queue_wait_for() in dependencies.c set
  * retry_at, before which schedule.c does not choose the job. After the job's process dies, queue_crashed() in finish.c
  * counts the death and queues the job again, until it has died CRASHES_MOST times. With isolate = off the daemon dies,
- * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts. Of
- * several nodes (shared.h), the others do that for one that fell silent: catalogue_recover_lost() in store/jobs.c. New
- * requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
+ * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts.
+ * With several nodes (shared.h), the others do that for a node whose lease expired: catalogue_recover_lost() in
+ * store/jobs.c. New requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
- * authoritative: a job is taken, shown as accepted, or shown as ended only after its row was committed, so everything
- * a caller has seen survives a crash. A key (the id of the result) has at most one unfinished job for each owner. A
+ * authoritative: the queue shows a job as accepted, running or ended only after its row was committed, so everything a
+ * caller has seen survives a crash. A key (the id of the result) has at most one unfinished job for each owner. A
  * second request of the same owner gets the first one's job. Jobs of different owners with the same key run one after
  * another: the work is done once, and no owner can see or cancel another's job. Up to KEEP_ENDED ended jobs stay in
  * memory; the one that ended first leaves first.
@@ -32,14 +32,13 @@
  * Every waiter is woken at its deadline at the latest.
  *
  * Fairness. Among runnable jobs the highest class goes first, then owners that run fewer jobs than their share of the
- * workers, then the owner with the least worker time so far (an owner who returns after a pause starts level with the
+ * workers, then the owner with the least worker time so far (an owner that returns after a pause starts level with the
  * least served of the others), then that owner's most urgent job, then the oldest. A running job is charged the time
  * that it has taken, or an estimate where that is more; when it leaves its worker, the measured time replaces both.
  * Guests: if all workers are busy or their memory is in use, a small job of an owner that runs nothing runs beside
  * them, on one thread. At most QUEUE_GUESTS_MAX guests run at once, within the memory of checks (budget.h). Large jobs
- * never
- * occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died) runs
- * alone; where jobs have processes of their own, guests of other owners run beside it, and do not wait for it.
+ * never occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died)
+ * runs alone; where jobs have processes of their own, guests of other owners run beside it, and do not wait for it.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H

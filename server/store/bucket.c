@@ -289,8 +289,7 @@ static int has(object_bucket *b, const char *name, const char *sha) {
   return there;
 }
 
-/* S3 puts the parts together. If its answer is lost, it may have done so, and then does not know the upload any more.
- */
+/* Asks S3 to join the parts. If the answer is lost, S3 may have joined them and no longer know the upload. */
 static store_result complete(object_bucket *b, const char *name, const char *query, const char *list, const char *sha) {
   char hash[65], why[S3_WHY] = "";
   unsigned char digest[crypto_hash_sha256_BYTES];

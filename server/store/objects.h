@@ -86,7 +86,7 @@ int objects_link(const objects *store, object_kind kind, const char *id, long se
 /* The name of an object in a bucket. */
 enum { OBJECT_NAME = 100 };
 void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]);
-/* id: within the name. 0: it is not a name of an object. */
+/* id: points into the name. 0: the name is not that of an object. */
 int objects_read_name(const char *name, object_kind *kind, const char **id);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
@@ -121,8 +121,8 @@ int objects_is_marked(const objects *store, object_kind kind, const char *id);
 store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd);
 /* `heal` is called after each object that was moved to quarantine, on the thread that found it, which holds no lock. */
 void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user);
-/* Waits until `heal` has returned for every object that is in quarantine now. Whoever finds a row without its object
- * calls this and looks at the row again: a thread may be about to delete it. Blocks; not within `heal`. */
+/* Waits until `heal` has returned for every object that is in quarantine now. A caller that finds a row without its
+ * object calls this and reads the row again, because a thread may be about to delete it. Blocks; not within `heal`. */
 void objects_settle(objects *store);
 
 /* Whether the file system is mounted read-only, as the kernel does after errors of the disk. */

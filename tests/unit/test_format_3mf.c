@@ -221,7 +221,7 @@ static void test_errors(void **state) {
        "document type", ORB_E_MALFORMED_MESH},
       {"<model " CORE "><resources>", "well-formed", ORB_E_MALFORMED_MESH},
       {"<model unit=\"mile\" " CORE "/>", "unit \"mile\"", ORB_E_MALFORMED_MESH},
-      {"<html/>", "no 3MF model", ORB_E_MALFORMED_MESH},
+      {"<html/>", "not a 3MF model", ORB_E_MALFORMED_MESH},
       {"<model " CORE "><resources>" OBJECT(1, "") OBJECT(1, "") "</resources></model>", "two resources",
        ORB_E_MALFORMED_MESH},
       {"<model " CORE "><resources><object/></resources></model>", "lacks its attribute \"id\"", ORB_E_MALFORMED_MESH},

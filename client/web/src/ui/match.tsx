@@ -69,7 +69,7 @@ export function Match({ result }: { result: Result }) {
         )}
         {supermesh.match && supermesh.match.verdict !== 'sure' && state.show !== 'stretch' && (
           <Button
-            title="Where the morph stretches the surface, and the map is least to be trusted"
+            title="Where the morph stretches the surface and the map is least reliable"
             onClick={() => {
               player.pause();
               set({ show: 'stretch' });

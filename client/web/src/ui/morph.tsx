@@ -378,7 +378,7 @@ function StretchLoader() {
   useEffect(() => void measureStretch(), [state.result]);
   return (
     <p class="hint">
-      The map is least to be trusted where it stretches most: the symmetric Dirichlet energy between the first shape and
+      The map is least reliable where it stretches most: the symmetric Dirichlet energy between the first shape and
       each other one, from 1 to bad.
     </p>
   );
