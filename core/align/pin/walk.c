@@ -3,7 +3,7 @@
  * All shapes are decimated with their landmarks kept, and embedded up to a level of a few hundred vertices. There
  * rotations bring the landmarks together, and their spherical means become targets. Each step moves a landmark along
  * the great circle, as far as no triangle around it shrinks below a share of its size; sweeps of the other vertices
- * make room between the steps. When no landmark advances any more, the level is refined and the walk goes on: more
+ * make room between the steps. When landmarks no longer advance, the level is refined and the walk continues: more
  * vertices give more freedom. Once all have arrived they are pinned, and the refinement continues to the full meshes.
  */
 #include <math.h>
