@@ -1,4 +1,4 @@
-/* Where the view looks from if the user does not say. */
+/* The direction of the view, unless the user sets it. */
 #ifndef ORB_CLI_VIEW_AIM_H
 #define ORB_CLI_VIEW_AIM_H
 

@@ -1,6 +1,6 @@
 /* Alignment by one method: each shape gets a working copy with the landmarks as vertices, the method runs, the result
- * is certified, and the composed map is improved. Soft landmarks are let go at the end. Shapes of which copies have
- * been aligned follow their copies. */
+ * is certified, and the composed map is improved. Soft landmarks are released at the end. If copies of large shapes
+ * were aligned, the shapes then follow their copies. */
 #include <math.h>
 #include <string.h>
 

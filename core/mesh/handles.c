@@ -1,8 +1,8 @@
 /* Closing handles.
  *
- * A cut along a loop that does not divide the surface, with a patch over each rim, takes one handle away, whether the
+ * A cut along a loop that does not divide the surface, with a patch over each rim, removes one handle, whether the
  * loop goes around the handle (which is cut then) or around its tunnel (which is filled then). The loops of one round
- * share no vertex and together leave the surface connected, so a round takes as many handles away as it has loops. Both
+ * share no vertex and together leave the surface connected, so a round removes as many handles as it has loops. Both
  * loops of a handle cross, so only the shorter one is cut.
  *
  * The vertices of a loop get a copy each; the copies lie at the same places, and both patches have the same shape.

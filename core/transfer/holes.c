@@ -112,8 +112,9 @@ orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, c
       ORB_TRY(orb_dropped_add(ctx, list, count, "holes", where,
                               "Only holes of the first shape can be open, so those of this shape stay filled."));
     } else if (!has && is_open) {
-      ORB_TRY(orb_dropped_add(ctx, list, count, "surface", where,
-                              "The first shape has holes and this shape has none, so what lies there is left out."));
+      ORB_TRY(
+          orb_dropped_add(ctx, list, count, "surface", where,
+                          "The first shape has holes and this shape has none, so the asset omits the surface there."));
     }
   }
   return ORB_OK;

@@ -1,4 +1,4 @@
-/* Signed URLs: a signature stands in for a token on the routes that only read what one recipe makes. */
+/* Signed URLs: a signature replaces the token on routes that only read the results of one recipe. */
 #include <stdio.h>
 #include <string.h>
 #include <time.h>

@@ -1,4 +1,4 @@
-/* What a job says that ended because processes died. */
+/* The problems of jobs that ended because processes died. */
 #include "api/problem.h"
 #include "queue/internal.h"
 

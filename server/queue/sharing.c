@@ -1,5 +1,5 @@
-/* A node's thread: it renews the lease, hears what other nodes do, and polls each second, because notices are lost with
- * their connection. */
+/* A node's thread: it renews the lease, receives the notices of other nodes, and polls each second, because notices are
+ * lost with their connection. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>

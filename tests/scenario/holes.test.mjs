@@ -41,7 +41,7 @@ for (let i = 0; i < 5; i++) {
   );
 }
 
-/** A hole of more than 48 edges gets a surface with vertices of its own, which are left out again as well. */
+/** A hole of more than 48 edges gets a surface with vertices of its own, which are omitted again as well. */
 const wide = ['bust with a wide hole', cut(shapes.egg(4), away([0.2, -1, 0.1], 70)), 1];
 open.push(wide);
 

@@ -342,7 +342,7 @@ test('a target of others, a schema of the future and wrong options are refused, 
   );
   await refused(
     migrate({ from: [...from.from, '--from-objects', cluster.objects] }, fresh('x5')),
-    /leave out --from-objects/,
+    /omit --from-objects/,
   );
   const empty = newCatalogue('nothing');
   await refused(

@@ -1,10 +1,10 @@
-/* Which few flips of a start cannot be cleared is close to chance, so there are four starts, one after the other, until
- * one is a map of shapes that correspond: from the targets, from the targets on two coarser levels, and from a
- * registration in space through samples of them, which is smoother. Then passes through samples of the best map, and a
- * draw, bring the energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no
- * pass helps, the map is drawn to the given targets.
+/* It is nearly random which few flips of a start cannot be cleared. So up to four starts are tried, until one gives a
+ * map of shapes that correspond: from the targets, from the targets on two coarser levels, and from a registration in
+ * space through samples of them, which is smoother. Then passes through samples of the best map, and a draw, bring the
+ * energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no pass helps, the
+ * map is drawn to the given targets.
  *
- * Where that comes to no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
+ * Where that gives no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
  * and is optimised on a coarse level, so several are tried, and the best one is refined. Pairs of the match that are
  * pinned (auto.c) come last: they take several times as long. */
 #include "align/map/targets.h"

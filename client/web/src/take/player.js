@@ -188,7 +188,7 @@ function toScene(m, read) {
 }
 
 /**
- * The keys of the path from the first to the last shape: {time, target}; target −1 is the base. Rests are left out, and
+ * The keys of the path from the first to the last shape: {time, target}; target −1 is the base. Rests are omitted, and
  * the shapes stand at equal intervals.
  */
 function pathOf({ json, read }, first, targets, shapes) {

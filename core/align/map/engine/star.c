@@ -3,8 +3,8 @@
  * A triangle of the moving shape with area a has three places on the fixed shape, and its image is the flat triangle of
  * their positions: D = ½ Σ cot·|edge|² is its Dirichlet energy and s its area, signed along the fixed shape's
  * interpolated normals (unsigned areas would lock triangles inverted). E = D (1 + a²/χ(s)²) is the symmetric Dirichlet
- * energy with χ(s) = ½(s + √(s² + ε²)), the usual regularised positive part, with which an inverted triangle can turn
- * right side out. On the sphere a hinge barrier acts on every determinant below a share (params.star.hinge) of what the
+ * energy with χ(s) = ½(s + √(s² + ε²)), the usual regularised positive part, which lets an inverted triangle become
+ * positive. On the sphere a hinge barrier acts on every determinant below a share (params.star.hinge) of what the
  * areas would give.
  *
  * Most stars have about six triangles: the loops run over eight lanes at once, and only the sums go one by one.
