@@ -378,8 +378,8 @@ function StretchLoader() {
   useEffect(() => void measureStretch(), [state.result]);
   return (
     <p class="hint">
-      The map is least reliable where it stretches most: the symmetric Dirichlet energy between the first shape and
-      each other one, from 1 to bad.
+      The map is least reliable where it stretches most: the symmetric Dirichlet energy between the first shape and each
+      other one, from 1 to bad.
     </p>
   );
 }
