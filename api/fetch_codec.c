@@ -37,7 +37,7 @@ static int read_members(const cJSON *body, api_fetch_request *out, api_problem *
   }
   strcpy(out->url, url);
   if (!api_upload_read(&query, &out->upload, problem)) {
-    problem->name = "invalid-request"; /* these are no query parameters */
+    problem->name = "invalid-request"; /* these are not query parameters */
     return 0;
   }
   return 1;

@@ -46,7 +46,7 @@ static int matches(const char *pattern, const char *path, char id[API_ID_SIZE]) 
   return 1;
 }
 
-const route *route_find(const char *method, const char *path, char id[API_ID_SIZE], char allow[64]) {
+const route *api_route_find(const char *method, const char *path, char id[API_ID_SIZE], char allow[64]) {
   const char *wanted = strcmp(method, "HEAD") == 0 ? "GET" : method;
   allow[0] = 0;
   id[0] = 0;
@@ -63,7 +63,7 @@ const route *route_find(const char *method, const char *path, char id[API_ID_SIZ
   return NULL;
 }
 
-int route_number(const route *found, const char *path) {
+int api_route_number(const route *found, const char *path) {
   const char *brace = strstr(found->path, "{k}");
   size_t rest = brace ? strlen(brace + 3) : 0, length = strlen(path);
   if (!brace || length < rest) {

@@ -15,7 +15,7 @@
 
 /* The route table: one row for each method of each path, with what its body holds, the scope that a token needs, the
  * query parameters that it takes, and the function of server/http that handles it. Adding a row is all that routing
- * needs: route_id, route_find() and the server's dispatch follow from it. The api library itself does not use the
+ * needs: route_id, api_route_find() and the server's dispatch follow from it. The api library itself does not use the
  * handlers.
  *
  * Query parameters are separated by spaces, and "?" follows one that needs no value. All others are refused; NULL: the
@@ -85,8 +85,8 @@ typedef struct route {
 /* Finds the route of a request, and fills id if the path has one. HEAD finds the route of GET. Returns NULL with an
  * empty allow if there is no such path, and NULL with allow filled, such as "GET, HEAD", if the path has other methods.
  */
-const route *route_find(const char *method, const char *path, char id[API_ID_SIZE], char allow[64]);
+const route *api_route_find(const char *method, const char *path, char id[API_ID_SIZE], char allow[64]);
 /* Returns the number in place of {k} in the path of a found route; −1 if the route has none. */
-int route_number(const route *found, const char *path);
+int api_route_number(const route *found, const char *path);
 
 #endif

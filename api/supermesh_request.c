@@ -295,7 +295,7 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
   api_json_close(out, '}');
 }
 
-/* Names of shapes and landmarks are no part of it. */
+/* Names of shapes and landmarks are not part of it. */
 static void write_alignment(const api_supermesh_request *request, api_text *out) {
   const api_landmark_list *list = &request->landmarks;
   api_json_open(out, '{');

@@ -79,7 +79,7 @@ int api_transfer_read(const cJSON *list, int32_t shape_count, orb_carry *out, in
     }
     for (int32_t i = 0; i < *count; i++) {
       if (out[i].from == made->from && out[i].what == made->what) {
-        return REFUSE(problem, *count, "Entries %d and %d of \"transfer\" ask for the same. Leave one out.", (int)i,
+        return REFUSE(problem, *count, "Entries %d and %d of \"transfer\" ask for the same. Omit one of them.", (int)i,
                       (int)*count);
       }
     }

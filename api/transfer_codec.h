@@ -10,8 +10,8 @@
 /* Reads the list. out: room for ORB_CARRY_MAX. Returns 1, or 0 with *problem filled. */
 int api_transfer_read(const cJSON *list, int32_t shape_count, orb_carry *out, int32_t *count, api_problem *problem);
 
-/* A list as a URL has it, such as "1:skin,2:texture:2048", as the member "transfer". What is no number stays text,
- * which api_transfer_read() refuses. NULL: the memory is spent. */
+/* Converts a list of a URL, such as "1:skin,2:texture:2048", to the member "transfer". Words in place of numbers stay
+ * strings, which api_transfer_read() refuses. NULL: out of memory. */
 cJSON *api_transfer_parse(const char *list);
 
 /* Appends the list in its canonical form. */

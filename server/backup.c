@@ -240,7 +240,7 @@ static int run_restore(const char *folder, const config *options) {
     return refuse_url();
   }
   if (!has(folder, mark) || !has(folder, "catalogue.sqlite")) {
-    complain(folder, "is no complete backup");
+    complain(folder, "is not a complete backup");
     return 1;
   }
   int empty = is_empty(options->data), reading = hold_backup(folder);

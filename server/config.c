@@ -46,12 +46,12 @@ static const entry table[] = {
      "15 minutes"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
     {"role", TEXT(role), "all",
-     "what a node does that shares its catalogue with others: serve (runs no jobs), work (serves no requests), or all"},
+     "of a node that shares its catalogue with others: serve (runs no jobs), work (serves no requests), or all"},
     {"metrics-listen", TEXT(metrics_listen), "",
-     "of the role work: where it answers /metrics, /livez and /readyz, and nothing else; as listen; without it: "
-     "nowhere"},
+     "address at which a node with the role work answers only /metrics, /livez and /readyz; as listen; without it: "
+     "none"},
     {"lease-seconds", NUMBER(lease_seconds, 2, 3600), "30",
-     "other nodes take over the jobs of a node that is silent for this long"},
+     "time without a sign of a node after which others take over its jobs"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
     {"worker-nice", NUMBER(worker_nice, 0, 19), "5",
      "nice value of jobs; the higher, the more they yield to other programs"},
@@ -85,7 +85,7 @@ static const entry table[] = {
     {"job-seconds", NUMBER(job_seconds, 1, 864000), "3600", "time limit of one job"},
     {"check-seconds", NUMBER(check_seconds, 1, 864000), "30", "time limit of the check of one upload"},
     {"isolate", TEXT(isolate), "on",
-     "on: meshes are read and jobs run in confined processes of their own; strict: refuse to start if the kernel "
+     "on: meshes are read and jobs run in separate confined processes; strict: refuse to start if the kernel "
      "cannot confine them; off: within the daemon, for debugging"},
     {"disk-reserve", NUMBER(disk_reserve, 0, INT64_C(1) << 46), "64M", "bytes that the daemon leaves free on the disk"},
     {"drain-seconds", NUMBER(drain_seconds, 0, 3600), "8", "on SIGTERM, time for running jobs to end"},
@@ -105,7 +105,7 @@ static const entry table[] = {
     {"hosts", TEXT(hosts), "",
      "further names of the daemon, which it checks if no token is needed, comma-separated, or *"},
     {"webhook-allow", TEXT(webhook_allow), "",
-     "networks besides public addresses that webhooks may go to, such as 10.1.0.0/16, comma-separated; also by http"},
+     "networks that webhooks may reach besides public addresses, such as 10.1.0.0/16, comma-separated; also by http"},
     {"webhook-retry-seconds", NUMBER(webhook_retry_seconds, 1, 3600), "5",
      "wait after the first failed attempt at a webhook; it doubles with each further one"},
     {"fetch-allow", TEXT(fetch_allow), "", "the same for meshes from a URL"},

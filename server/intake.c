@@ -219,7 +219,8 @@ static store_result publish_again(objects *store, const intake_file *file) {
   return there;
 }
 
-/* Commits the row of a published mesh. A hold is lost only while the database is away, or its connections are cut. */
+/* Commits the row of a published mesh. A hold is lost only while the database is unreachable, or its connections are
+ * cut. */
 static store_result put_row(const intake_file *file, catalogue *cat, objects *store, const resource *row,
                             const char *tenant, int64_t quota, int *fresh) {
   enum { LOST_TRIES = 3 };

@@ -6,15 +6,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "admin/kinds.h"
 #include "backup.h"
 #include "control.h"
 #include "evict.h"
+#include "folder_lock.h"
+#include "housekeeping.h"
 #include "http/certificate.h"
 #include "http/http.h"
 #include "isolate/readers.h"
@@ -40,43 +40,6 @@ static void raise_descriptor_limit(void) {
     if (setrlimit(RLIMIT_NOFILE, &limit) != 0) {
       log_warn("the limit on open files could not be raised");
     }
-  }
-}
-
-enum { LOCK_TOLD = -2 };
-
-/* One process per data folder. The kernel releases the lock when the process ends, also after a crash. −1: another
- * process has it; LOCK_TOLD: the log says what is wrong. */
-static int lock_data(const char *data) {
-  char path[PATH_MAX];
-  if (mkdir(data, 0700) != 0 && errno != EEXIST) {
-    log_error("the folder %s cannot be created: %s", data, strerror(errno));
-    return LOCK_TOLD;
-  }
-  snprintf(path, sizeof path, "%s/lock", data);
-  int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  if (fd < 0) {
-    log_error(errno == EROFS
-                  ? "the data folder %s is on a read-only file system (%s): mount it for writing, or restore a "
-                    "backup into a folder elsewhere"
-                  : "the data folder %s cannot be written: %s",
-              data, strerror(errno));
-    return LOCK_TOLD;
-  }
-  for (int tries = 0; fd >= 0 && tries < 50; tries++) { /* a dying process may hold it a moment longer */
-    if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
-      return fd;
-    }
-    usleep(100000);
-  }
-  close(fd);
-  return -1;
-}
-
-/* lock: what lock_data() returned, < 0. */
-static void say_locked(const char *data, int lock) {
-  if (lock != LOCK_TOLD) {
-    log_error("the data folder %s is in use by another process or cannot be locked; stop that process first", data);
   }
 }
 
@@ -132,64 +95,7 @@ static int take_signals(sigset_t *set) {
   return signal_pipe[0];
 }
 
-enum { TICK_MS = 1000, EVICT_GRACE_MS = 5000 };
-
-/* Deletes what a backup kept. Evicts derived objects beyond derived-bytes, after jobs succeeded, profiles were made, or
- * when the last round could not evict enough. Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting
- * client can fetch them. */
-static void keep_budget(const server *srv, int64_t *seen, int *over) {
-  const int64_t budget = srv->options->derived_bytes;
-  const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
-  evict_held(&env);
-  if (budget <= 0 || !queue_keeps_house(srv->q)) {
-    return;
-  }
-  int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED) + __atomic_load_n(&srv->profiles_made, __ATOMIC_RELAXED);
-  if (succeeded != *seen || *over || config_is_shared(srv->options)) { /* other nodes make results, too */
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    *seen = succeeded;
-    *over = evict_derived(&env, budget, (int64_t)now.tv_sec * 1000 - EVICT_GRACE_MS) > budget;
-  }
-}
-
-enum { FORGET_BATCH = 256, FORGET_ROUNDS = 4, RECOUNT_MS = 60000 };
-
-/* Ended jobs in the catalogue. before: those from before this process started, less those forgotten since. */
-typedef struct ended_jobs {
-  int counted;
-  int64_t before, at; /* at: when they were counted, orb_clock_ms() */
-} ended_jobs;
-
-/* Deletes the oldest ended jobs beyond keep-jobs, in small batches so that other writes are not delayed. Counts the
- * catalogue's ended jobs once; after that, the queue's counts suffice. */
-static void keep_jobs(const server *srv, ended_jobs *jobs) {
-  const int64_t keep = srv->options->keep_jobs;
-  int64_t since = 0;
-  if (keep <= 0 || !queue_keeps_house(srv->q)) {
-    return;
-  }
-  if (config_is_shared(srv->options) && orb_clock_ms() - jobs->at >= RECOUNT_MS) { /* jobs end on other nodes, too */
-    jobs->counted = 0;
-    jobs->at = orb_clock_ms();
-  }
-  int64_t stored = jobs->counted ? 0 : catalogue_jobs_ended(srv->cat);
-  for (int s = API_JOB_SUCCEEDED; s <= API_JOB_CANCELLED; s++) {
-    since += queue_ended(srv->q, (api_job_state)s);
-  }
-  if (!jobs->counted && stored >= 0) {
-    *jobs = (ended_jobs){1, stored - since, jobs->at};
-  }
-  for (int round = 0; round < FORGET_ROUNDS && jobs->counted && jobs->before + since > keep; round++) {
-    int64_t many = jobs->before + since - keep;
-    many = many < FORGET_BATCH ? many : FORGET_BATCH;
-    if (catalogue_jobs_forget(srv->cat, (int)many) != STORE_OK) {
-      log_warn("ended jobs could not be removed from the catalogue");
-      return;
-    }
-    jobs->before -= many;
-  }
-}
+enum { TICK_MS = 1000 };
 
 /* Kept to read the configuration again on SIGHUP. */
 typedef struct command_line {
@@ -285,10 +191,10 @@ static void feed_watchdog(server *srv, probe *p) {
 static void wait_for_stop(server *srv, const command_line *line, int signals) {
   static probe probed = {.task = {.run = probe_run}, .idle = 1}; /* static: the pool may hold it after the return */
   struct pollfd wait[2] = {{.fd = signals, .events = POLLIN}, {.fd = srv->control, .events = POLLIN}};
-  int64_t seen = -1, every = systemd_watchdog_ms(), fed = 0, kept = 0;
+  int64_t every = systemd_watchdog_ms(), fed = 0, kept = 0;
   int tick = every > 0 && every < TICK_MS ? (int)every : TICK_MS;
-  ended_jobs jobs = {0};
-  for (int over = 0;;) {
+  housekeeping done = HOUSEKEEPING_START;
+  for (;;) {
     unsigned char number;
     int ready = poll(wait, 2, tick);
     int64_t now = orb_clock_ms();
@@ -298,9 +204,9 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
     }
     if (now - kept >= TICK_MS) {
       kept = now;
-      keep_budget(srv, &seen, &over);
+      housekeeping_budget(srv, &done);
       signers_store_use(srv->signers);
-      keep_jobs(srv, &jobs);
+      housekeeping_jobs(srv, &done);
     }
     if (ready > 0 && wait[1].revents) {
       control_serve(srv->control, on_command, srv);
@@ -341,12 +247,12 @@ static void on_shared_change(void *user, const char *what) {
   }
 }
 
-static int keeps_house(void *q) {
-  return queue_keeps_house(q);
+static int may_deliver(void *q) {
+  return queue_does_housekeeping(q);
 }
 
 static int start_outbox(server *srv, deliver_options *options) {
-  options->may = keeps_house;
+  options->may = may_deliver;
   options->user = srv->q;
   srv->outbox = deliver_start(options, srv->cat);
   if (srv->outbox) {
@@ -474,7 +380,7 @@ static void stop(server *srv, worker_pool *workers) {
   if (srv->signers) {
     signers_store_use(srv->signers);
   }
-  deliver_stop(srv->outbox); /* workers and tasks have ended: nothing wakes it any more */
+  deliver_stop(srv->outbox); /* workers and tasks have ended and no longer wake it */
   readers_stop();            /* they give memory back, and the budget tells the queue and the pools */
   queue_destroy(srv->q);
   tasks_free(srv->io);
@@ -516,9 +422,9 @@ static int run(const command_line *line) {
   int signals = take_signals(&set);
   srv.started_ms = orb_clock_ms();
   raise_descriptor_limit();
-  int lock = signals < 0 ? -1 : lock_data(options->data);
+  int lock = signals < 0 ? -1 : folder_lock_data(options->data);
   if (signals >= 0 && lock < 0) {
-    say_locked(options->data, lock);
+    folder_lock_say(options->data, lock);
   }
   isolate_mode mode = strcmp(options->isolate, "off") == 0      ? ISOLATE_OFF
                       : strcmp(options->isolate, "strict") == 0 ? ISOLATE_STRICT
@@ -581,11 +487,11 @@ int main(int argc, char **argv) {
       break;
   }
   int asked = admin_command_ask(&admin, &options);
-  int lock = asked < 0 ? lock_data(options.data) : -1;
+  int lock = asked < 0 ? folder_lock_data(options.data) : -1;
   if (lock < 0 && asked < 0) { /* the daemon may have just been starting */
     asked = admin_command_ask(&admin, &options);
     if (asked < 0) {
-      say_locked(options.data, lock);
+      folder_lock_say(options.data, lock);
       return 1;
     }
   }

@@ -146,7 +146,7 @@ static void tell_wrong(void *user, const resource *row, const char *what, const 
   static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
   (void)user;
   printf("%s %s: %s %s%s\n", names[row->kind], row->id, what, why,
-         row->kind == RESOURCE_ALIGNMENT ? "; it is left out, the daemon computes it again" : "");
+         row->kind == RESOURCE_ALIGNMENT ? "; it is omitted, and the daemon computes it again" : "");
 }
 
 static int end(store_result result, const object_counts *c, const config *to) {

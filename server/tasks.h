@@ -2,9 +2,8 @@
  *
  * Contract. Tasks of one owner start in the order in which they were added, each on one thread. Owners take turns: the
  * owner with the fewest running tasks goes first, then the one that has used the least time of threads. An owner that
- * returns after a pause starts level with the least served of the others. A task for which there is no memory lets
- * others pass.
- * tasks_stop() runs the waiting tasks, then joins the threads.
+ * returns after a pause starts level with the least served of the others. While the memory for a
+ * task is lacking, others pass it. tasks_stop() runs the waiting tasks, then joins the threads.
  */
 #ifndef ORB_TASKS_H
 #define ORB_TASKS_H
@@ -18,7 +17,7 @@ typedef struct task {
   void (*run)(struct task *self);
   int64_t memory;   /* bytes that it needs; 0: little */
   budget_part part; /* from which they are taken */
-  uint64_t owner;   /* a hash of who asked for it; 0: all others, together one owner */
+  uint64_t owner;   /* a hash of the client or tenant that asked for it; 0: all others, together one owner */
 } task;
 
 typedef struct tasks tasks;

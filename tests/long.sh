@@ -142,7 +142,7 @@ part_deaths() {
   node tests/long/deaths.mjs
 }
 
-# Makes each call of the daemon that may fail do so, once and from then on; ORB_FAULT_RUNS=few leaves out allocations.
+# Makes each call of the daemon that may fail do so, once and from then on; ORB_FAULT_RUNS=few omits allocations.
 # The same under AddressSanitizer and UBSan: tests/long.sh faults_asan.
 part_faults() {
   cmake --preset release -DORB_TESTS=ON >/dev/null

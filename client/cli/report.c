@@ -88,7 +88,7 @@ static int were_found(const cJSON *supermesh) {
   return member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") == NULL;
 }
 
-/* The landmarks of the request came from a match that was found: "exact" is said only of places that someone set. */
+/* The landmarks of the request came from a match that was found: only places that a user set are called exact. */
 static int were_guessed(const cJSON *supermesh) {
   const cJSON *landmark;
   cJSON_ArrayForEach(landmark, member(member(supermesh, "request"), "landmarks")) {

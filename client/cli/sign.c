@@ -25,7 +25,7 @@ static long long moment(const char *text) {
 static const char *why_not(const char *url, const char *target) {
   for (const unsigned char *at = (const unsigned char *)url; *at; at++) {
     if (*at <= ' ' || *at >= 0x7f || strchr("\"<>\\^`{|}#", *at)) {
-      return "percent-encode spaces, non-ASCII letters and \" < > \\ ^ ` { | }, and leave out the fragment";
+      return "percent-encode spaces, non-ASCII letters and \" < > \\ ^ ` { | }, and omit the fragment";
     }
   }
   if (!target) {

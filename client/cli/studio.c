@@ -1,4 +1,4 @@
-/* studio: a daemon of its own, and the browser that shows it. */
+/* studio: starts a daemon and opens its studio in the browser. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>

@@ -1,4 +1,4 @@
-/* Where the view looks from if the user does not say. */
+/* The direction of the view, unless the user sets it. */
 #ifndef ORB_CLI_VIEW_AIM_H
 #define ORB_CLI_VIEW_AIM_H
 
@@ -9,7 +9,7 @@
  *
  * Up is y, as glTF says, unless the first shape clearly lies down: it is a mirror image of itself along y and not along
  * x or z, or it stands on one spot along y and on separate feet along another axis. The yaw shows the largest side of
- * the shapes, turned by a quarter of a right angle so that depth shows. */
+ * the shapes, rotated by a quarter of a right angle so that depth shows. */
 void view_aim(const view_mesh *mesh, view_options *options);
 
 #endif

@@ -1,4 +1,4 @@
-/* What a supermesh's report gives reason to look at. */
+/* Warnings about a supermesh, from its report. */
 #ifndef ORB_CLI_WARNINGS_H
 #define ORB_CLI_WARNINGS_H
 

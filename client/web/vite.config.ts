@@ -68,7 +68,7 @@ export default defineConfig({
     proxy: {
       '/v1': {
         target: process.env.ORBMORPH_SERVER ?? 'http://127.0.0.1:8080',
-        // The daemon refuses the origin of this server; to the daemon, the proxy is no page.
+        // The daemon refuses the origin of this server; to the daemon, the proxy is not a page.
         configure: (proxy) => proxy.on('proxyReq', (request) => request.removeHeader('origin')),
       },
     },

@@ -199,8 +199,9 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
   return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, &aims, options->preset);
 }
 
-/* Makes the next best match the match, if its map has clearly less energy than the best one's: a twisted body bends
- * less when its limbs are swapped, and the map tells. That the two disagree leaves the match unclear. */
+/* Makes the next best match the match, if its map has clearly less energy than the best one's: a twisted body can
+ * bend less when its limbs are swapped, and then only the energy of the map shows the mistake. Since bend and energy
+ * disagree, the match counts as unclear. */
 static orb_status next_take(orb_context *ctx, matches *m, double poor, next_match *next, orb_alignment *alignment) {
   if (!next->is_open || !(next->alignment.energy < ORB_FIND_OTHER_GAIN * alignment->energy)) {
     return ORB_OK;

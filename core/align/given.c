@@ -1,6 +1,6 @@
 /* Alignment by one method: each shape gets a working copy with the landmarks as vertices, the method runs, the result
- * is certified, and the composed map is improved. Soft landmarks are let go at the end. Shapes of which copies have
- * been aligned follow their copies. */
+ * is certified, and the composed map is improved. Soft landmarks are released at the end. If copies of large shapes
+ * were aligned, the shapes then follow their copies. */
 #include <math.h>
 #include <string.h>
 
@@ -115,7 +115,7 @@ static void set_springs(const orb_landmark *landmarks, int32_t count, const int3
   }
 }
 
-/* From here on the soft landmarks of a shape are no vertices that others share. */
+/* From here on the soft landmarks of a shape are not vertices that others share. */
 static void free_landmarks(const orb_landmark *landmarks, int32_t count, orb_aligned_shape *shape) {
   for (int32_t l = 0; l < count; l++) {
     if (is_soft(&landmarks[l])) {
@@ -299,9 +299,9 @@ done:
   return status;
 }
 
-/* The alignment of shapes that are one in other poses. The map without landmarks starts on the shapes' own embeddings,
- * which pins bend: two true landmarks at the ends of a limb that is long on the sphere and short on the other one fold
- * what lies between. *found 0: the landmarks do not say so, or there is no map, and `out` is empty. */
+/* Aligns shapes that are one body in several poses. The map without landmarks starts on the shapes' own embeddings,
+ * which pins would distort: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
+ * what lies between them. *found 0: the landmarks do not show one body, or no map was found, and `out` is empty. */
 static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                               const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                               double stretch, orb_alignment *out, int *found) {
@@ -357,14 +357,15 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const
   return ORB_OK;
 }
 
-orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                           orb_alignment *out) {
+/* Aligns by the method, then composes the maps. quick: first tries what leads to a good map soonest. */
+static orb_status align_and_compose(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                    const orb_landmark *landmarks, int32_t landmark_count,
+                                    const orb_align_options *options, int quick, orb_alignment *out) {
   const int composes =
       options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
   orb_status status = create(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
   if (status == ORB_OK && composes) {
-    status = landmark_count > 0 && shape_count > 1
+    status = quick && landmark_count > 0 && shape_count > 1
                  ? improve(ctx, shapes, landmarks, options, out)
                  : orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset);
   }
@@ -377,15 +378,16 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
   return status;
 }
 
+orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                           orb_alignment *out) {
+  return align_and_compose(ctx, shapes, shape_count, landmarks, landmark_count, options, 1, out);
+}
+
 orb_status orb_align_pinned(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                             const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                             orb_alignment *out) {
-  ORB_TRY(create(ctx, shapes, shape_count, landmarks, landmark_count, options, out));
-  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset);
-  if (status != ORB_OK) {
-    orb_alignment_free(ctx, out);
-  }
-  return status;
+  return align_and_compose(ctx, shapes, shape_count, landmarks, landmark_count, options, 0, out);
 }
 
 /* Refines the map of the copy of shape s, and puts the whole shape in the copy's place. *energy: INFINITY if there is

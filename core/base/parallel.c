@@ -5,13 +5,13 @@
  * left, and the caller waits for claimed chunks only: a thread that has not begun one delays nobody, however late a
  * busy machine runs it. No lock is taken on the way, except to sleep and to wake a sleeper.
  *
- * A loop is handed out only where that is likely to pay. The pool keeps what an iteration of each body took; a loop
- * that should end sooner than it takes to wake a thread runs in the caller, which looks at the clock as it goes along
- * and hands out the rest of a loop that turns out to be long.
+ * The pool shares a loop only if that is likely to pay. It remembers how long an iteration of each body took. A loop
+ * that should end sooner than it takes to wake a thread runs in the caller, which watches the clock and shares the rest
+ * of a loop that turns out to be long.
  *
- * Threads spin for a short while before they sleep. Spinning that was in vain halves the next, so that on a busy
- * machine, where it would only use up the job's share, there is soon none. If some threads cannot be started, the loop
- * runs on the others: results do not depend on how many there are.
+ * Threads spin for a short while before they sleep. If a thread spins in vain, it spins half as long the next time; so
+ * on a busy machine, where spinning only uses up the job's share, threads soon stop spinning. If some threads cannot be
+ * started, the loop runs on the others: results do not depend on how many there are.
  */
 #include "base/parallel.h"
 

@@ -28,7 +28,7 @@ orb_status orb_carry_blame(orb_context *ctx, orb_status status, int32_t shape, i
 orb_status orb_carry_refuse(orb_context *ctx, const orb_carry *carries, int32_t number) {
   const orb_carry *carry = &carries[number];
   orb_status status = orb_fail(ctx, ORB_E_BAD_OPTION,
-                               "\"transfer\" takes \"%s\" from shape %d, which has %s. Leave it out, or name another "
+                               "\"transfer\" takes \"%s\" from shape %d, which has %s. Omit it, or name another "
                                "shape.",
                                orb_carry_name(carry->what), (int)carry->from, titles[carry->what]);
   return orb_carry_blame(ctx, status, carry->from, number);

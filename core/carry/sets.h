@@ -9,7 +9,7 @@
 
 /* Carries the sets of a kind: out has room for ORB_GIVEN_SETS, *count becomes their number, *has whether the file has
  * any. Sets that the base of the asset has already, as `own` at the corners of the aligned mesh (NULL: it has none),
- * are left out. */
+ * are omitted. */
 ORB_MUST_CHECK orb_status orb_carry_sets(orb_context *ctx, orb_carry_source *source, orb_carry_what what,
                                          const float *own, orb_wedges *out, int32_t *count, int *has);
 

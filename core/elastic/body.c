@@ -20,10 +20,8 @@ void orb_body_normals(const orb_mesh *m, const double *x, double *normal, double
   }
   for (int32_t t = 0; t < m->triangle_count; t++) {
     const int32_t *v = m->triangles + 3 * (size_t)t;
-    double u[3], w[3], n[3];
-    orb_sub(x + 3 * (size_t)v[1], x + 3 * (size_t)v[0], u);
-    orb_sub(x + 3 * (size_t)v[2], x + 3 * (size_t)v[0], w);
-    orb_cross(u, w, n);
+    double n[3];
+    orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], n);
     double area = orb_length(n) / 2;
     for (int k = 0; k < 3; k++) {
       for (int i = 0; i < 3; i++) {

@@ -1,10 +1,11 @@
 /* A round adds up pulls on the vertices of mesh a: of the rough map, and of the nearest places both ways. Then
  * rotations and positions take turns: each vertex takes the rotation that fits its edges best, and all positions
- * together solve a linear system in which edges want to be what these rotations make of them. From round to round pulls
- * grow stronger.
+ * together solve a linear system in which each edge should be what these rotations make of it. The pulls grow stronger
+ * from round to round.
  *
- * The first rotations come from the rough map: how it rotates the surroundings of each vertex. From the rotation of
- * the whole instead, an arm that is raised by 150° stays wrung, since rotations of neighbours hold each other. */
+ * The first rotations come from the rough map: how it rotates the surroundings of each vertex. If they came from the
+ * rotation of the whole instead, an arm raised by 150° would stay twisted, since neighbouring rotations hold each
+ * other. */
 #include "elastic/elastic.h"
 
 #include <math.h>

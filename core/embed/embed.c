@@ -1,4 +1,4 @@
-/* Embedding: a mesh in, a certified embedding out. README.md of this folder says where what is. */
+/* Embedding: a mesh in, a certified embedding out. README.md of this folder is the guide. */
 #include <math.h>
 #include <string.h>
 

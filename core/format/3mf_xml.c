@@ -384,7 +384,7 @@ static orb_status on_element(void *user, const char *name, const char **attribut
     }
   }
   if (depth == 0) {
-    return malformed(x, "a root element that is no 3MF model:", name);
+    return malformed(x, "a root element that is not a 3MF model:", name);
   }
   return in == RESOURCES ? note_unread(x, name) : ORB_OK;
 }

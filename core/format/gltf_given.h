@@ -55,7 +55,7 @@ ORB_MUST_CHECK orb_status orb_given_targets_read(orb_context *ctx, const orb_giv
 void orb_given_targets_free(orb_context *ctx, orb_given_targets *targets);
 
 /* The triangles of all primitives of a document as numbers of its vertices, with their texture coordinates: the set
- * that the base colour texture of their material uses, else the first. Those of strips and fans are left out. */
+ * that the base colour texture of their material uses, else the first. Those of strips and fans are omitted. */
 typedef struct orb_given_charts {
   int32_t triangle_count, vertex_count;
   int32_t *triangles; /* 3 a triangle */

@@ -181,7 +181,7 @@ struct Keeper {
       throw Fault{ORB_E_BAD_OPTION,
                   named[wrong[0].index]
                       ? "\"template\" names " + mesh +
-                            ", but the closed surface has no vertex of it. Leave it out, or upload the file with "
+                            ", but the closed surface has no vertex of it. Omit it, or upload the file with "
                             "part=NAME so that it is the surface."
                       : "The closed surface has vertices of " + mesh +
                             ", which \"template\" does not name. Name it, or upload the file with part=NAME.",

@@ -273,7 +273,7 @@ int64_t Materials::choose_set(const cJSON *base) const {
   return set == INT32_MAX ? 0 : set;
 }
 
-/* Where an image is in the file. Returns why it is left out, NULL if it is there. */
+/* Where an image is in the file. Returns why it is omitted, NULL if it is there. */
 const char *Materials::find_image(const cJSON *image, Bytes *bytes, std::vector<unsigned char> *own) const {
   std::string uri = text_of(image, "uri");
   if (uri.compare(0, 5, "data:") == 0) {
@@ -287,7 +287,7 @@ const char *Materials::find_image(const cJSON *image, Bytes *bytes, std::vector<
   return nullptr;
 }
 
-/* Sets the number in kept_ of an image of the file. Returns why it is left out, NULL if it is not. */
+/* Sets the number in kept_ of an image of the file. Returns why it is omitted, NULL if it is not. */
 const char *Materials::use_image(int64_t index, int32_t *number) {
   size_t at = static_cast<size_t>(index);
   *number = image_number_[at];
@@ -322,7 +322,7 @@ const char *Materials::use_image(int64_t index, int32_t *number) {
   return nullptr;
 }
 
-/* Returns why a texture is left out, NULL if it is not. A base colour that refers to nothing is refused. */
+/* Returns why a texture is omitted, NULL if it is not. A base colour that refers to nothing is refused. */
 const char *Materials::load_texture(const cJSON *reference, bool is_base, orb_texture *out) {
   if (is_base) {
     (void)element(textures_, whole(reference, "index", NONE), "texture");
@@ -386,7 +386,7 @@ void Materials::load_textures(const cJSON *base, orb_material *out) {
   }
 }
 
-/* Appends the values of the present material to the build, without the textures that are left out. */
+/* Appends the values of the present material to the build, without the textures that are omitted. */
 void Materials::keep(orb_material *out) const {
   out->first_value = static_cast<int32_t>(build_->value_count);
   for (const Value &value : values_) {

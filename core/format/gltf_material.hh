@@ -24,7 +24,7 @@ class Materials {
   void load(const cJSON *doc);
 
   /* The set of texture coordinates that a material uses: n of TEXCOORD_n. A mesh has one, so the textures of a material
-   * that use another set are left out. 0 for none and for a number that the file does not have. */
+   * that use another set are omitted. 0 for none and for a number that the file does not have. */
   int64_t set_of(int64_t material) const;
 
   /* Passes the images to the finished mesh. */
@@ -63,7 +63,7 @@ class Materials {
   std::vector<int64_t> sets_;             /* of each material */
   std::vector<orb_image> kept_;           /* owned: the context's memory, passed to the mesh or freed */
   std::vector<int32_t> image_number_;     /* of each image of the file: its number in kept_; −1: not yet known */
-  std::vector<const char *> image_fault_; /* of each image: why it is left out; NULL: it is not */
+  std::vector<const char *> image_fault_; /* of each image: why it is omitted; NULL: it is not */
   std::string where_;                     /* the present material */
   std::vector<Value> values_;             /* of the present material */
   int64_t set_ = 0;                       /* that the present material uses */

@@ -27,7 +27,7 @@ bool is_near(const Matrix &a, const Matrix &b) {
   return true;
 }
 
-/* A copy of a node without what is no part of a skeleton. */
+/* A copy of a node without what is not part of a skeleton. */
 cJSON *copy_node(const cJSON *node) {
   static const char *const members[] = {"name", "translation", "rotation", "scale", "matrix", "extras"};
   cJSON *out = made(cJSON_CreateObject());

@@ -10,8 +10,8 @@ enum { ORB_XML_DEPTH = 64, ORB_XML_TOKEN = 1 << 16 };
 
 typedef struct orb_xml orb_xml;
 
-/* A start tag, or with attributes NULL an end tag. attributes: names and values by turns, then NULL. depth: 0 for the
- * root. */
+/* A start tag, or with attributes NULL an end tag. attributes: alternating names and values, then NULL. depth: 0 for
+ * the root. */
 typedef orb_status (*orb_xml_element)(void *user, const char *name, const char **attributes, int depth);
 
 ORB_MUST_CHECK orb_status orb_xml_begin(orb_context *ctx, orb_xml_element element, void *user, orb_xml **out);

@@ -17,7 +17,7 @@ typedef struct orb_zip_entry {
   int method, is_encrypted;
 } orb_zip_entry;
 
-/* Finds the directory. Returns 0 if the bytes are no archive or lack its end. O(1): the directory is not read. */
+/* Finds the directory. Returns 0 if the bytes are not an archive or lack its end. O(1): the directory is not read. */
 int orb_zip_open(const unsigned char *bytes, size_t size, orb_zip *out);
 
 /* The entry at *at (0: the first), and *at moves to the next. Returns 0 at the end, and where the directory is damaged.

@@ -65,11 +65,7 @@ static void input_body(void *arg, int64_t begin, int64_t end, int thread) {
 }
 
 static double area_of(const coarse_job *job, int64_t t) {
-  double u[3], w[3], n[3];
-  orb_sub(made_corner(job, t, 1), made_corner(job, t, 0), u);
-  orb_sub(made_corner(job, t, 2), made_corner(job, t, 0), w);
-  orb_cross(u, w, n);
-  return 0.5 * orb_length(n);
+  return orb_triangle_area(made_corner(job, t, 0), made_corner(job, t, 1), made_corner(job, t, 2));
 }
 
 /* Keeps the list sorted by falling error. */

@@ -61,18 +61,14 @@ typedef struct body {
 } body;
 
 static double measure(const orb_mesh *mesh, int32_t t, double centroid[3]) {
-  double u[3], v[3], n[3];
   const double *p[3];
   for (int k = 0; k < 3; k++) {
     p[k] = mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)t + (size_t)k];
   }
-  orb_sub(p[1], p[0], u);
-  orb_sub(p[2], p[0], v);
-  orb_cross(u, v, n);
   for (int c = 0; c < 3; c++) {
     centroid[c] = (p[0][c] + p[1][c] + p[2][c]) / 3;
   }
-  return 0.5 * orb_length(n);
+  return orb_triangle_area(p[0], p[1], p[2]);
 }
 
 static int32_t root(int32_t *piece, int32_t v) {
@@ -165,7 +161,7 @@ static double find_length(const body *b, int up, double out[3]) {
   out[up] = 0;
   out[u] = cos(angle);
   out[v] = sin(angle);
-  return sqrt((uu + vv + gap) / fmax(uu + vv - gap, 1e-300));
+  return sqrt((uu + vv + gap) / fmax(uu + vv - gap, ORB_TINY));
 }
 
 static double along(const double direction[3], const double from[3], const double to[3]) {

@@ -199,7 +199,7 @@ static double quality(const double *positions, const int32_t *corner) {
   return edges > 0 ? 3.4641016151377544 * orb_length(normal) / edges : 0;
 }
 
-/* Lists the triangles that are no slivers on `least` of the two shapes: a sliver's stretch is mostly rounding, and one
+/* Lists the triangles that are not slivers on `least` of the two shapes: a sliver's stretch is mostly rounding, and one
  * sliver can outweigh all other triangles in a mean. If less than a tenth is left, lists all. */
 static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, const double *b, int least, int32_t *out) {
   int32_t count = 0;

@@ -249,7 +249,7 @@ static void move(const double matrix[16], const double x[3], double out[3]) {
 
 /* The area of a triangle on the way from the first moved shape (0) to the second (1). */
 static double area_between(const orb_warn_pair *pair, int32_t t, double way) {
-  double x[3][3], normal[3], u[3], v[3];
+  double x[3][3];
   for (int k = 0; k < 3; k++) {
     double p[3], q[3];
     move(pair->move[0], corner(pair, 0, t, k), p);
@@ -258,10 +258,7 @@ static double area_between(const orb_warn_pair *pair, int32_t t, double way) {
       x[k][c] = (1 - way) * p[c] + way * q[c];
     }
   }
-  orb_sub(x[1], x[0], u);
-  orb_sub(x[2], x[0], v);
-  orb_cross(u, v, normal);
-  return 0.5 * orb_length(normal);
+  return orb_triangle_area(x[0], x[1], x[2]);
 }
 
 /* Marks the triangles of thin patches; returns whether there are any. patch: of each vertex. */

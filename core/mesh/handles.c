@@ -1,8 +1,8 @@
 /* Closing handles.
  *
- * A cut along a loop that does not divide the surface, with a patch over each rim, takes one handle away, whether the
+ * A cut along a loop that does not divide the surface, with a patch over each rim, removes one handle, whether the
  * loop goes around the handle (which is cut then) or around its tunnel (which is filled then). The loops of one round
- * share no vertex and together leave the surface connected, so a round takes as many handles away as it has loops. Both
+ * share no vertex and together leave the surface connected, so a round removes as many handles as it has loops. Both
  * loops of a handle cross, so only the shorter one is cut.
  *
  * The vertices of a loop get a copy each; the copies lie at the same places, and both patches have the same shape.
@@ -57,11 +57,8 @@ static double diagonal_of(const orb_mesh *mesh, double *facing) {
 
 static double area_of(const orb_mesh *mesh, int32_t t) {
   const int32_t *c = mesh->triangles + 3 * (size_t)t;
-  double u[3], w[3], n[3];
-  orb_sub(mesh->positions + 3 * (size_t)c[1], mesh->positions + 3 * (size_t)c[0], u);
-  orb_sub(mesh->positions + 3 * (size_t)c[2], mesh->positions + 3 * (size_t)c[0], w);
-  orb_cross(u, w, n);
-  return 0.5 * orb_length(n);
+  return orb_triangle_area(mesh->positions + 3 * (size_t)c[0], mesh->positions + 3 * (size_t)c[1],
+                           mesh->positions + 3 * (size_t)c[2]);
 }
 
 /* Whether the patches of a loop lie outside the body: the surface then faces the loop's centre. */

@@ -175,7 +175,7 @@ void orb_polygon_cut(orb_polygon *polygon, const double *positions, const int32_
   int32_t at = 1, left = count, idle = 0;
   while (left > 3) {
     int32_t a = polygon->prev[at], c = polygon->next[at];
-    int hopeless = idle > left || --budget < 0; /* a corner that is no ear costs a test, too */
+    int hopeless = idle > left || --budget < 0; /* a corner that is not an ear costs a test, too */
     const double *flat = polygon->flat;
     if (hopeless || convex ||
         (signed_area2(flat + 2 * a, flat + 2 * at, flat + 2 * c) > 0 && ear_is_free(polygon, a, at, c, &budget))) {

@@ -148,7 +148,7 @@ int orb_orient_careful(const double a[3], const double b[3], const double c[3]) 
     double d = a[0] * (yz - zy) + a[1] * (zx - xz) + a[2] * (xy - yx);
     double permanent =
         fabs(a[0]) * (fabs(yz) + fabs(zy)) + fabs(a[1]) * (fabs(zx) + fabs(xz)) + fabs(a[2]) * (fabs(xy) + fabs(yx));
-    if (fabs(d) > 1e-15 * permanent + 1e-220) {
+    if (fabs(d) > ORB_ORIENT_RELATIVE * permanent + ORB_ORIENT_LEAST) {
       return d > 0 ? 1 : -1;
     }
   }

@@ -8,6 +8,10 @@
 
 #include <math.h>
 
+/* Keeps a divisor from being 0. It is far below the rounding of every length, area and determinant of a shape, so
+ * adding it changes no other quotient. */
+static const double ORB_TINY = 1e-300;
+
 static inline double orb_dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -46,6 +50,20 @@ static inline double orb_normalize(double a[3]) {
   return length;
 }
 
+/* n: the normal of the triangle a, b, c, twice its area long. */
+static inline void orb_triangle_normal(const double a[3], const double b[3], const double c[3], double n[3]) {
+  double u[3], w[3];
+  orb_sub(b, a, u);
+  orb_sub(c, a, w);
+  orb_cross(u, w, n);
+}
+
+static inline double orb_triangle_area(const double a[3], const double b[3], const double c[3]) {
+  double n[3];
+  orb_triangle_normal(a, b, c, n);
+  return 0.5 * orb_length(n);
+}
+
 /* h += weight · y xᵀ; h: 3×3, row-major. */
 static inline void orb_add_outer(double h[9], const double y[3], const double x[3], double weight) {
   for (int k = 0; k < 9; k++) {
@@ -55,10 +73,8 @@ static inline void orb_add_outer(double h[9], const double y[3], const double x[
 
 /* det(a, b, c), computed from differences to a, so that close points lose no digits. */
 static inline double orb_det(const double a[3], const double b[3], const double c[3]) {
-  double u[3], w[3], n[3];
-  orb_sub(b, a, u);
-  orb_sub(c, a, w);
-  orb_cross(u, w, n);
+  double n[3];
+  orb_triangle_normal(a, b, c, n);
   return orb_dot(a, n);
 }
 

@@ -2,7 +2,7 @@
  * all shapes' vertices on the sphere, which is their Delaunay triangulation. It keeps every input vertex, but none of
  * the input edges; how far its surfaces deviate from the shapes is proved afterwards (placed/bound.h), not controlled.
  *
- * Points that are equal bit for bit (landmarks) become one. Qhull works with tolerances: it may leave out points very
+ * Points that are equal bit for bit (landmarks) become one. Qhull works with tolerances: it may omit points very
  * close to each other or to a facet's plane, and facets of nearly collinear points may come out degenerate. The corners
  * of facets that are not positive are set aside and the hull is made again from the rest. What was set aside or left
  * out is then inserted by exact location and splitting, and edges are flipped to those of the hull. The result is
@@ -117,7 +117,7 @@ static orb_status start(orb_context *ctx, hull_points *h, orb_net *net) {
       orb_free(ctx, hull.triangles);
       continue;
     }
-    /* Renumber the corners without the points that Qhull left out; their order stays. */
+    /* Renumber the corners without the points that Qhull omitted; their order stays. */
     orb_status status = ORB_E_NO_MEMORY;
     int32_t *compact = ORB_NEW0(ctx, int32_t, h->given_count);
     if (compact) {

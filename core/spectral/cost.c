@@ -1,7 +1,10 @@
-/* Three measures, of which none decides alone. Distances along the surface tell maps from wrong permutations of limbs.
- * They hardly tell a map from its twin, left and right swapped with front and back: there the local relief does, the
- * heights of points over the tangent planes of others nearby, which know bulges from hollows, and which bending changes
- * at joints only. And a map that takes one limb as it is and another as its mirror image shows in the orientation. */
+/* The cost of a map, from three measures; no single one decides.
+ *
+ * - Distances along the surface tell the right map from wrong permutations of limbs, but hardly from its twin (left and
+ *   right swapped with front and back).
+ * - Relief, the heights of points over the tangent planes of others nearby, tells bulges from hollows, and so a map
+ *   from its twin. Bending changes it only at joints.
+ * - Orientation shows a map that takes one limb as it is and another as its mirror image. */
 #include "spectral/cost.h"
 
 #include <math.h>

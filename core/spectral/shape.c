@@ -30,11 +30,9 @@ static void work_free(work *w) {
   orb_free(w->ctx, w->entries);
 }
 
+/* Twice the area of the triangle v. */
 static double triangle_area2(const double *x, const int32_t *v, double normal[3]) {
-  double u[3], w[3];
-  orb_sub(x + 3 * (size_t)v[1], x + 3 * (size_t)v[0], u);
-  orb_sub(x + 3 * (size_t)v[2], x + 3 * (size_t)v[0], w);
-  orb_cross(u, w, normal);
+  orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], normal);
   return orb_length(normal);
 }
 

@@ -41,18 +41,19 @@ typedef struct orb_spectral_list {
   orb_spectral_candidate candidate[ORB_SPECTRAL_MAX];
 } orb_spectral_list;
 
-/* mirrored: the maps that reverse orientation. Of a shape to itself these are its mirror symmetries, which tell which
- * of its parts are twins. The same bytes for any number of threads; about 0.1 s for two meshes of a thousand
- * vertices. */
 /* Where each candidate of a list takes every vertex of either mesh, as vertices of the other; the caller frees both. */
 typedef struct orb_spectral_dense {
   int32_t *forth; /* candidates × vertices of a */
   int32_t *back;  /* candidates × vertices of b */
 } orb_spectral_dense;
 
+/* The same, at most `most` candidates that keep orientation, with where each takes every vertex. */
 ORB_MUST_CHECK orb_status orb_spectral_find_dense(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int32_t most,
                                                   orb_spectral_list *out, orb_spectral_dense *dense);
 
+/* Finds the candidates, the best first. mirrored: those that reverse orientation; of a shape to itself these are its
+ * mirror symmetries, which show which of its parts correspond to each other. The result has the same bytes for any
+ * number of threads. About 0.1 s for two meshes of a thousand vertices. */
 ORB_MUST_CHECK orb_status orb_spectral_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored,
                                             orb_spectral_list *out);
 

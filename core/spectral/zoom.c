@@ -20,6 +20,7 @@ static const int level_size[ORB_ZOOM_LEVELS] = {7, 9, 12, 16, 20, 25, 31};
 static const float level_triple[ORB_ZOOM_LEVELS] = {2, 2, 2, 2, 1, 1, 0}; /* weight of the triple products */
 static const int level_detail[ORB_ZOOM_LEVELS] = {0, 0, 1, 1, 2, 2, 2};
 
+static const double CONVERGES = 2.5;   /* squared singular value up to which the iteration converges: below 3 */
 static const double ORTHOGONAL = 1e-3; /* a matrix times its transpose is nearer than this to the identity */
 
 enum {
@@ -276,7 +277,7 @@ static double multiply_transpose(double (*x)[K], int size, double (*out)[K], dou
 static void make_orthogonal(double (*x)[K], int size) {
   double square[K][K], next[K][K], bound;
   for (int step = 0; step < POLAR && multiply_transpose(x, size, square, &bound) > ORTHOGONAL; step++) {
-    double scale = bound > 2.5 ? sqrt(2.5 / bound) : 1;
+    double scale = bound > CONVERGES ? sqrt(CONVERGES / bound) : 1;
     for (int i = 0; i < size; i++) {
       for (int k = 0; k < size; k++) {
         next[i][k] = 1.5 * scale * x[i][k];

@@ -32,7 +32,7 @@ static int side(const orb_arc_tracer *t, int32_t h) {
   const double *c = corner(t, h);
   double x = c[0] - t->p[0], y = c[1] - t->p[1], z = c[2] - t->p[2];
   double d = t->normal[0] * x + t->normal[1] * y + t->normal[2] * z;
-  if (fabs(d) > 1e-15 * t->size * (fabs(x) + fabs(y) + fabs(z)) + 1e-220) {
+  if (fabs(d) > ORB_ORIENT_RELATIVE * t->size * (fabs(x) + fabs(y) + fabs(z)) + ORB_ORIENT_LEAST) {
     return d > 0 ? 1 : -1;
   }
   return orb_orient(t->p, t->q, c);

@@ -35,7 +35,7 @@ typedef struct orb_draft {
   orb_wedges *tangents;  /* frame_count; NULL: no material needs them */
   int32_t color_count;   /* frames whose colours are written: 0, 1 or all */
   int32_t *home; /* per supermesh triangle: the first shape's triangle that holds its centre; NULL: not needed */
-  int has_holes; /* triangles whose home fills a hole of the first shape are left out */
+  int has_holes; /* triangles whose home fills a hole of the first shape are omitted */
   int32_t part_count;
   orb_draft_part *parts;
   int32_t nudged;

@@ -34,14 +34,11 @@ static int fills(const grouping *g, int32_t t) {
 /* On the first shape. */
 static double area_of(const grouping *g, int32_t t) {
   const int32_t *v = g->supermesh->triangles + 3 * (int64_t)t;
-  double p[3][3], a[3], b[3], normal[3];
+  double p[3][3];
   for (int k = 0; k < 3; k++) {
     orb_place_position(g->mesh, &g->supermesh->places[v[k]], p[k]);
   }
-  orb_sub(p[1], p[0], a);
-  orb_sub(p[2], p[0], b);
-  orb_cross(a, b, normal);
-  return orb_length(normal) / 2;
+  return orb_triangle_area(p[0], p[1], p[2]);
 }
 
 /* Gathers the triangles that edges join to t on its side of the rims. Returns how many; *area: theirs; *beside: the
@@ -115,8 +112,9 @@ orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, c
       ORB_TRY(orb_dropped_add(ctx, list, count, "holes", where,
                               "Only holes of the first shape can be open, so those of this shape stay filled."));
     } else if (!has && is_open) {
-      ORB_TRY(orb_dropped_add(ctx, list, count, "surface", where,
-                              "The first shape has holes and this shape has none, so what lies there is left out."));
+      ORB_TRY(
+          orb_dropped_add(ctx, list, count, "surface", where,
+                          "The first shape has holes and this shape has none, so the asset omits the surface there."));
     }
   }
   return ORB_OK;

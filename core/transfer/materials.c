@@ -9,6 +9,9 @@
 #include "format/material_table.h"
 #include "mesh/dropped.h"
 
+/* The material of a shape that has none: light grey, so that white light does not clip, and half matt. */
+static const float PLAIN_TONE = 0.8f, PLAIN_ROUGHNESS = 0.6f;
+
 static const char *image_kind(const orb_image *image) {
   static const unsigned char png[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   if (image->size > 24 && memcmp(image->bytes, png, sizeof png) == 0) {
@@ -155,12 +158,12 @@ orb_status orb_draft_materials_add(orb_context *ctx, const orb_draft *draft, orb
     copy_materials(mesh, draft->options, out, &scene->material_value_count);
     status = add_images(ctx, mesh, binary, out, scene->material_value_count, number, &scene->image_count);
   } else {
-    float tone = draft->color_count > 0 ? 1.0f : 0.8f;
+    float tone = draft->color_count > 0 ? 1.0f : PLAIN_TONE;
     scene->material_count = 1;
     out->materials[0] = (orb_material){.name = "plain",
                                        .base_color = {tone, tone, tone, 1},
                                        .metallic = 0,
-                                       .roughness = 0.6f,
+                                       .roughness = PLAIN_ROUGHNESS,
                                        .base_texture.image = -1};
   }
 done:

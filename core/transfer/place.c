@@ -4,6 +4,9 @@
 #include "numeric/vec3.h"
 #include "orbmorph/transfer.h"
 
+/* A squared height below this share of the length is rounding: the triangle has no area. */
+static const double NO_HEIGHT = 1e-30;
+
 /* Barycentric coordinates of a point that lies in the triangle up to rounding. A degenerate triangle is treated as its
  * longest edge, one without extent as a single corner. */
 static void barycentric(const double *const corner[3], const double p[3], double out[3]) {
@@ -33,7 +36,7 @@ static void barycentric(const double *const corner[3], const double p[3], double
     height += h * h;
     over += h * (d[i] - along * e[a][i]);
   }
-  out[a] = height > 1e-30 * length[a] ? over / height : 0;
+  out[a] = height > NO_HEIGHT * length[a] ? over / height : 0;
   out[c] = along - out[a] * foot;
   out[b] = 1 - out[a] - out[c];
 }

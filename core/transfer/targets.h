@@ -1,4 +1,4 @@
-/* The frames of morph targets that are no shapes. */
+/* The frames of morph targets that are not shapes. */
 #ifndef ORB_TRANSFER_TARGETS_H
 #define ORB_TRANSFER_TARGETS_H
 

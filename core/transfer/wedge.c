@@ -24,6 +24,7 @@ enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
 static const float SAME = 1e-6f;
 static const double NORMAL_SEAM = 0.01; /* half a degree: rounded normals of one smooth vertex differ by that */
 static const double COLOR_SEAM = 1e-3;  /* a quarter of a step of 8 bits */
+static const double NO_NORMAL = 1e-6;   /* length of a mean of unit normals: a shorter one has no direction */
 static const double ON_EDGE = 1e-9;     /* a barycentric coordinate below this counts as zero */
 
 typedef struct wedge_job {
@@ -70,7 +71,7 @@ static int same_value(const wedge_job *job, int64_t g, int64_t h) {
 static void store(const wedge_job *job, const double value[MAX_WIDTH], int32_t triangle, float *out) {
   double v[MAX_WIDTH];
   memcpy(v, value, sizeof v);
-  if (job->unit && !(orb_normalize(v) > 1e-6)) {
+  if (job->unit && !(orb_normalize(v) > NO_NORMAL)) {
     orb_face_normal(&job->shape->mesh, triangle, v);
     if (!(orb_normalize(v) > 0)) {
       v[0] = v[1] = 0;

@@ -3,12 +3,12 @@
  *
  * In: rows of the outbox. Out: requests over the network, and their results in the outbox.
  *
- * Contract. A message counts as delivered when its receiver has answered 2xx, and this is committed. So each message is
- * delivered at least once, also after a crash; a receiver recognises a repeated one by its webhook-id. To one receiver
- * (an origin, for one tenant) goes one message at a time, to all of them together DELIVER_MOST, of which one tenant has
- * at most half, so a receiver that does not answer delays only itself. Memory is bounded by that number. After a
- * failure the wait doubles from `retry_ms`, in DELIVER_ATTEMPTS attempts: 23 hours with 5 seconds. A redirect and any
- * other answer is a failure; 410 is the last one.
+ * Contract. A message counts as delivered once its receiver has answered 2xx and this is committed. So the deliverer
+ * sends each message at least once, also after a crash; a receiver recognises a repeated message by its webhook-id. The
+ * deliverer sends one message at a time to a receiver (an origin, for one tenant), and DELIVER_MOST at a time in all,
+ * of which one tenant has at most half. So a receiver that does not answer delays only itself, and memory is bounded.
+ * Any other answer is a failure, also a redirect. After a failure the deliverer waits `retry_ms`, and twice as long
+ * after each further one, for DELIVER_ATTEMPTS attempts: 23 hours with 5 seconds. It stops at the answer 410.
  */
 #ifndef ORB_DELIVER_H
 #define ORB_DELIVER_H
@@ -33,7 +33,7 @@ void deliver_wake(void *user);
 /* Ends what is in flight without an answer; those messages remain pending. NULL: nothing. */
 void deliver_stop(deliverer *d);
 
-/* The wait before the next attempt, after so many failed ones; −1: there is no further one. chance: from 0 to 1,
+/* The wait before the next attempt, after this many failures; −1: no further attempt. chance: from 0 to 1,
  * spreads the wait by a tenth, so that many do not come at once. */
 int64_t deliver_wait_ms(int64_t retry_ms, int failed, double chance);
 

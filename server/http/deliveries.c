@@ -1,4 +1,4 @@
-/* GET /v1/jobs/{job}/deliveries and POST …/deliveries/{k}/retry: what was sent to the webhooks of a job. */
+/* GET /v1/jobs/{job}/deliveries and POST …/deliveries/{k}/retry: the messages to the webhooks of a job. */
 #include <stdlib.h>
 #include <time.h>
 

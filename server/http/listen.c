@@ -84,7 +84,7 @@ static int take_passed(listener *out) {
   return describe(out, "") ? 1 : -1;
 }
 
-/* Removes a socket file that no process listens on any more. 0, with the reason logged, if the path is taken. */
+/* Removes a socket file on which no process listens. 0, with the reason logged, if the path is taken. */
 static int clear_path(const struct sockaddr_un *at) {
   struct stat info;
   if (lstat(at->sun_path, &info) != 0) {

@@ -28,7 +28,7 @@ static struct {
 } recipes = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 /* The text of a request's recipe; returns its size, 0 if it is too long to be remembered. The signature changes each
- * time that a page is made, and is no part of the recipe. */
+ * time that a page is made, and is not part of the recipe. */
 static size_t text_of(const request *r, char out[RECIPE_MOST]) {
   const char *query = strchr(r->target, '?'), *tenant = access_tenant(r);
   const char *end = query ? strstr(query, "&key=") : NULL;

@@ -91,9 +91,9 @@ static void request_begin(request *r, const char *method, const char *url, const
   r->begun = 1;
   r->method = method;
   r->head = strcmp(method, "HEAD") == 0;
-  r->route = route_find(r->method, path, r->id, allow);
+  r->route = api_route_find(r->method, path, r->id, allow);
   watched_headers(r->watched);
-  r->shape = r->route ? route_number(r->route, path) : -1;
+  r->shape = r->route ? api_route_number(r->route, path) : -1;
   parse_trace(header_of(r, "traceparent"), r->trace);
   if (!is_about_node(r, path)) {
     trace_begin(r->trace, r->span);

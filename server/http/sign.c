@@ -1,4 +1,4 @@
-/* Signed URLs: a signature stands in for a token on the routes that only read what one recipe makes. */
+/* Signed URLs: a signature replaces the token on routes that only read the results of one recipe. */
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -23,7 +23,7 @@ static void refuse_too_many(request *r, const char *name, int64_t limit, int64_t
 int sign_check(request *r, const char *path, api_problem *problem) {
   signed_target parts;
   char id[API_ID_SIZE], allow[64];
-  const route *found = strcmp(r->method, "OPTIONS") == 0 ? route_find("GET", path, id, allow) : r->route;
+  const route *found = strcmp(r->method, "OPTIONS") == 0 ? api_route_find("GET", path, id, allow) : r->route;
   int there = takes_signatures(found) ? signature_read(parse_target(r->target), &parts) : 0;
   int64_t now = (int64_t)time(NULL), limit = 0;
   if (there == 0) {

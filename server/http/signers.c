@@ -172,7 +172,7 @@ int signature_read(const char *target, signed_target *out) {
   size_t size = 0;
   for (const char *c = query; c; c = strchr(c + 1, '&')) {
     if (strncmp(c + 1, mark, sizeof mark - 1) == 0) {
-      at = at ? at : c + 1; /* the first: what follows it is no digits, so a second one makes it malformed */
+      at = at ? at : c + 1; /* the first: what follows it is not digits, so a second one makes it malformed */
     }
     if (!at && strncmp(c + 1, "key=", 4) == 0) {
       key = c + 1;

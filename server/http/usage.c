@@ -1,4 +1,4 @@
-/* GET /v1/usage: what tenants use, and what they may. */
+/* GET /v1/usage: what tenants use, and their limits. */
 #include "store/usage.h"
 
 #include <string.h>

@@ -1,15 +1,15 @@
-/* Processes of their own for what reads callers' bytes: the check of an upload, and jobs.
+/* Separate processes for all work that reads callers' bytes: the checks of uploads, and jobs.
  *
  * channel.h   the frames that both sides exchange
- * sandbox.h   what such a process cannot do
+ * sandbox.h   what such a process may not do
  * zygote.c    the small process that forks them
  * readers.h   processes that check several small files
  *
  * The daemon starts this program again in an internal mode, as the zygote: a process with one thread and without
  * sockets, files or data of callers. For each piece of work the zygote forks a process, which confines itself, gets its
- * inputs as descriptors for reading over the channel, and sends back progress and results. It dies after one piece of
- * work, or after some small files of one tenant. The daemon alone touches catalogue and store. When the daemon dies,
- * the zygote sees the end of its socket and exits, and the kernel kills the others.
+ * inputs as descriptors for reading over the channel, and sends back progress and results. It exits after one piece
+ * of work, or after several small files of one tenant. Only the daemon accesses the catalogue and the store. When the
+ * daemon dies, the zygote sees the end of its socket and exits, and the kernel kills the others.
  */
 #ifndef ORB_ISOLATE_H
 #define ORB_ISOLATE_H
@@ -31,9 +31,9 @@ int isolate_is_on(void);
 typedef struct isolated {
   int channel, status, pidfd; /* −1: none */
   orb_context *ctx;           /* of the job: its cancel flag and deadline end the process */
-  int (*wanted)(void *user);  /* 0: cancel the context; NULL: nobody is asked */
+  int (*wanted)(void *user);  /* 0: cancel the context; NULL: never */
   void *user;
-  int64_t last_ms; /* orb_clock_ms() beyond which nothing is waited for; 0: the context decides alone */
+  int64_t last_ms; /* orb_clock_ms() at which waiting ends; 0: only the context ends it */
 } isolated;
 
 /* Forks a process; 0 with the reason logged. Starts a new zygote if it has died. Blocks for about a millisecond. */

@@ -91,7 +91,7 @@ static const char *place_host(const parameters *p, s3_place *out) {
   if (!consists_of(host, LETTERS CAPITALS DIGITS "-.:[]")) {
     return "its endpoint must be a scheme, a host and perhaps a port, without path or user";
   }
-  const char *own = plain ? ":80" : ":443"; /* libcurl leaves it out of the header Host, which is signed */
+  const char *own = plain ? ":80" : ":443"; /* libcurl omits it from the header Host, which is signed */
   if (end - host > (long)strlen(own) && strcmp(end - strlen(own), own) == 0 && *host != '[') {
     end[-(long)strlen(own)] = 0;
   }

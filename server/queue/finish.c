@@ -143,7 +143,7 @@ static void cancel_needless(queue *q, job *of) {
 
 enum { LOST_TRIES = 3 };
 
-/* Tries again while the database is away: nothing is lost. */
+/* Tries again while the database is unreachable: nothing is lost. */
 static store_result end_surely(queue *q, job *j, job_end *end, const queue_made *made) {
   store_result stored = end_job(q, j, end, 1);
   for (int lost = 0; q->shared;) {
@@ -261,7 +261,7 @@ int queue_crashed(queue *q, job *j, int is_sure) {
   while (stored == STORE_ERROR && q->shared && shared_pause(q)) {
     stored = catalogue_job_crashed(q->cat, &j->row, is_sure, !is_sure, unix_ms());
   }
-  if (crashes >= MOST_CRASHES) {
+  if (crashes >= CRASHES_MOST) {
     return 1;
   }
   count_time(q, j);

@@ -139,7 +139,7 @@ store_result queue_recover(queue *q, int isolated) {
   }
   crash_problem(&text);
   store_result result =
-      text.failed ? STORE_ERROR : catalogue_recover(q->cat, isolated ? 0 : MOST_CRASHES, unix_ms(), text.data);
+      text.failed ? STORE_ERROR : catalogue_recover(q->cat, isolated ? 0 : CRASHES_MOST, unix_ms(), text.data);
   api_text_free(&text);
   FAULT_POINT("recovered");
   int64_t after = 0;

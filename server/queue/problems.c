@@ -1,4 +1,4 @@
-/* What a job says that ended because processes died. */
+/* The problems of jobs that ended because processes died. */
 #include "api/problem.h"
 #include "queue/internal.h"
 
@@ -8,7 +8,7 @@ void crash_problem(api_text *text) {
       &problem, "crashed",
       "The daemon crashed %d times while this job ran alone; the job is not retried. Please report this as a bug, "
       "with its meshes.",
-      MOST_CRASHES);
+      CRASHES_MOST);
   api_problem_write(&problem, text);
   api_problem_free(&problem);
 }

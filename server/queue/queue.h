@@ -16,14 +16,14 @@
  * The retry of a job. A job that fails is not retried. The queue runs a job again in two cases. After the store fails,
  * queue_finish(), queue_give_back() and queue_put_off() in finish.c and queue_wait_for() in dependencies.c set
  * retry_at, before which schedule.c does not choose the job. After the job's process dies, queue_crashed() in finish.c
- * counts the death and queues the job again, until it has died MOST_CRASHES times. With isolate = off the daemon dies,
- * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts. Of
- * several nodes (shared.h), the others do that for one that fell silent: catalogue_recover_lost() in store/jobs.c. New
- * requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
+ * counts the death and queues the job again, until it has died CRASHES_MOST times. With isolate = off the daemon dies,
+ * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts.
+ * With several nodes (shared.h), the others do that for a node whose lease expired: catalogue_recover_lost() in
+ * store/jobs.c. New requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
- * authoritative: a job is taken, shown as accepted, or shown as ended only after its row was committed, so everything
- * a caller has seen survives a crash. A key (the id of the result) has at most one unfinished job for each owner. A
+ * authoritative: the queue shows a job as accepted, running or ended only after its row was committed, so everything a
+ * caller has seen survives a crash. A key (the id of the result) has at most one unfinished job for each owner. A
  * second request of the same owner gets the first one's job. Jobs of different owners with the same key run one after
  * another: the work is done once, and no owner can see or cancel another's job. Up to KEEP_ENDED ended jobs stay in
  * memory; the one that ended first leaves first.
@@ -32,14 +32,13 @@
  * Every waiter is woken at its deadline at the latest.
  *
  * Fairness. Among runnable jobs the highest class goes first, then owners that run fewer jobs than their share of the
- * workers, then the owner with the least worker time so far (an owner who returns after a pause starts level with the
+ * workers, then the owner with the least worker time so far (an owner that returns after a pause starts level with the
  * least served of the others), then that owner's most urgent job, then the oldest. A running job is charged the time
  * that it has taken, or an estimate where that is more; when it leaves its worker, the measured time replaces both.
  * Guests: if all workers are busy or their memory is in use, a small job of an owner that runs nothing runs beside
  * them, on one thread. At most QUEUE_GUESTS_MAX guests run at once, within the memory of checks (budget.h). Large jobs
- * never
- * occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died) runs
- * alone; where jobs have processes of their own, guests of other owners run beside it, and do not wait for it.
+ * never occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died)
+ * runs alone; where jobs have processes of their own, guests of other owners run beside it, and do not wait for it.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H
@@ -52,8 +51,6 @@
 /* A priority is QUEUE_URGENCIES · class + urgency. Classes come from tokens and order all jobs; urgencies order the
  * jobs of one owner. */
 enum { QUEUE_URGENCIES = 8 };
-
-enum { MOST_CRASHES = CRASHES_MOST }; /* of a job, alone */
 
 typedef struct queue queue;
 typedef struct job job;
@@ -137,7 +134,7 @@ job *queue_find(queue *q, const char *id); /* NULL: not in memory, or another no
  * exist. */
 job *queue_follow(queue *q, const char *id);
 /* Whether this process does what only one node may do. */
-int queue_keeps_house(queue *q);
+int queue_does_housekeeping(queue *q);
 void queue_release(queue *q, job *j);
 
 const char *job_id(const job *j);
@@ -224,7 +221,7 @@ void queue_put_off(queue *q, job *j);
 /* Returns a taken job; its attempt does not count. */
 void queue_give_back(queue *q, job *j);
 /* The process of a claimed job died. Its attempt counts. Returns 0 if the job is queued again; the worker's reference
- * is released. 1: it has died MOST_CRASHES times; the worker must end it. is_sure: the job alone can be the cause; else
+ * is released. 1: it has died CRASHES_MOST times; the worker must end it. is_sure: the job alone can be the cause; else
  * it runs alone next time. */
 int queue_crashed(queue *q, job *j, int is_sure);
 int queue_runs_alone(queue *q, job *j);

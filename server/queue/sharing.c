@@ -1,5 +1,5 @@
-/* A node's thread: it renews the lease, hears what other nodes do, and polls each second, because notices are lost with
- * their connection. */
+/* A node's thread: it renews the lease, receives the notices of other nodes, and polls each second, because notices are
+ * lost with their connection. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +40,7 @@ int shared_pause(queue *q) {
   return goes_on;
 }
 
-int queue_keeps_house(queue *q) {
+int queue_does_housekeeping(queue *q) {
   return !q->shared || __atomic_load_n(&q->shared->house, __ATOMIC_ACQUIRE);
 }
 
@@ -82,7 +82,7 @@ static void take_over(queue *q) {
   api_text text = {0};
   crash_problem(&text);
   if (!text.failed) {
-    catalogue_recover_lost(q->cat, MOST_CRASHES, unix_ms(), text.data);
+    catalogue_recover_lost(q->cat, CRASHES_MOST, unix_ms(), text.data);
   }
   api_text_free(&text);
 }
@@ -121,7 +121,7 @@ static void *thread_main(void *argument) {
     if (connected && (fresh || now - renewed >= s->options.lease_ms / RENEWALS) && renew(q)) {
       renewed = now;
     }
-    __atomic_store_n(&s->house, connected && notices_keeps_house(s->bell), __ATOMIC_RELEASE);
+    __atomic_store_n(&s->house, connected && notices_does_housekeeping(s->bell), __ATOMIC_RELEASE);
     if (connected && (fresh || now - looked >= TICK_MS)) {
       looked = now;
       look_around(q);

@@ -67,7 +67,7 @@ static void set_away(object_bucket *b, int away, const char *why) {
   }
   pthread_mutex_unlock(&b->lock);
   if (changes && away) {
-    log_error("S3 is away: bucket %s: %s; requests that need it are answered 503 until it is back",
+    log_error("S3 is unreachable: bucket %s: %s; requests that need it are answered 503 until it is back",
               b->options.place.bucket, why);
   } else if (changes) {
     log_warn("S3 is back");
@@ -91,7 +91,7 @@ static store_result meaning(const s3_answer *a) {
   return STORE_UNFIT;
 }
 
-/* Sends a request, unless S3 is away. The caller frees answer->text. */
+/* Sends a request, unless S3 is unreachable. The caller frees answer->text. */
 static store_result ask(object_bucket *b, const s3_request *request, s3_answer *answer) {
   memset(answer, 0, sizeof *answer);
   if (bucket_is_away(b)) {
@@ -289,8 +289,7 @@ static int has(object_bucket *b, const char *name, const char *sha) {
   return there;
 }
 
-/* S3 puts the parts together. If its answer is lost, it may have done so, and then does not know the upload any more.
- */
+/* Asks S3 to join the parts. If the answer is lost, S3 may have joined them and no longer know the upload. */
 static store_result complete(object_bucket *b, const char *name, const char *query, const char *list, const char *sha) {
   char hash[65], why[S3_WHY] = "";
   unsigned char digest[crypto_hash_sha256_BYTES];

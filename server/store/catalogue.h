@@ -3,19 +3,26 @@
  *
  * Reading order:
  *   catalogue.h   rows of meshes, embeddings, supermeshes, jobs and events: the interface
- *   objects.h     files, each named by a hash; owners.h   who owns which row; tokens.h   the tokens
- *   sql.h         statements over a database; sqlite.c, postgresql.c   the drivers
+ *   objects.h     files, each named by a hash
+ *   owners.h      which tenant owns which row
+ *   tokens.h      the tokens
+ *   sql.h         statements over a database; its drivers are sqlite.c and postgresql.c
  *   postgresql_schema.c   the schema in PostgreSQL
  *   database.c    connections with prepared statements, the schema and its migrations
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
- *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row; lists.c   lists with a
- * filter deliveries.c  the outbox: what is still to be sent to webhooks objects.c     publishing, reading and deleting
- * files; spheres.c   the file of aligned spheres; alignments.c   kept alignments
+ *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row
+ *   lists.c       lists with a filter
+ *   deliveries.c  the outbox: messages to webhooks that are not delivered yet
+ *   objects.c     publishing, reading and deleting files
+ *   spheres.c     the file of aligned spheres
+ *   alignments.c  kept alignments
  *   usage.c       what tenants use
- *   shared.c      jobs of several nodes; notices.c   what nodes hear of each other
+ *   shared.c      jobs of several nodes
+ *   notices.c     notices between nodes
  *   object_lock.c the lock of objects over all nodes
- *   snapshot.c    a copy of the catalogue for a backup; transfer.c   objects from one folder to another
+ *   snapshot.c    a copy of the catalogue for a backup
+ *   transfer.c    objects from one folder to another
  *   move.c        a whole deployment from one place to another
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
@@ -39,9 +46,9 @@ store_result catalogue_open(const char *where, catalogue **out);
 /* shared: further nodes use this database in PostgreSQL at the same time (shared.h). */
 store_result catalogue_open_shared(const char *where, int shared, catalogue **out);
 int catalogue_is_shared(const catalogue *cat);
-/* Whether it is in PostgreSQL and that does not answer. */
+/* Whether it is in PostgreSQL and PostgreSQL does not answer. */
 int catalogue_is_away(const catalogue *cat);
-/* Whether it did not answer at some moment since orb_clock_ms() was `since`. */
+/* Whether it has failed to answer at some time since `since` (orb_clock_ms()). */
 int catalogue_was_away(const catalogue *cat, int64_t since);
 void catalogue_close(catalogue *cat); /* completes all waiting writes, then stops the writer */
 

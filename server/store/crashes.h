@@ -7,7 +7,8 @@
 #include "store/catalogue.h"
 #include "store/database.h"
 
-enum { CRASHES_MOST = 3 }; /* of a key; then its work is refused until the operator clears it */
+/* Deaths after which a job fails, and after which the work of its key is refused until the operator clears it. */
+enum { CRASHES_MOST = 3 };
 
 /* Counts one, within a write. request: of the job; NULL: the key is a mesh's. */
 int crash_note(database *db, const char *key, const char *request, const char *tenant, int64_t now);

@@ -67,7 +67,7 @@ static const char *const migrations[] = {
     "INSERT INTO secret(bytes) VALUES(randomblob(16));",
     /* The hash of a supermesh's places, for --check-data. */
     "ALTER TABLE resource ADD COLUMN places TEXT NOT NULL DEFAULT '';",
-    /* No alignment reads `seed` any more, and a request with it would be refused: jobs that still wait lose it. */
+    /* `seed` no longer exists, and the daemon would refuse a request with it: remove it from jobs that still wait. */
     "UPDATE job SET request=json_remove(request, '$.align.options.seed')"
     " WHERE kind=1 AND state IN (0, 1) AND json_valid(request);",
     /* Landmarks. */

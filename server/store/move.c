@@ -74,7 +74,7 @@ static store_result match_source(const store_place *p, const char *rows, const c
     return STORE_UNFIT;
   }
   if (p->catalogue && place_has_catalogue(p->data)) {
-    log_error("%s has a catalogue in SQLite: leave out --from-catalogue", p->data);
+    log_error("%s has a catalogue in SQLite: omit --from-catalogue", p->data);
     return STORE_UNFIT;
   }
   if (!p->bucket.url && *files) {
@@ -82,7 +82,7 @@ static store_result match_source(const store_place *p, const char *rows, const c
     return STORE_UNFIT;
   }
   if (p->bucket.url && place_has_files(p->data)) {
-    log_error("the objects of %s are files: leave out --from-objects", p->data);
+    log_error("the objects of %s are files: omit --from-objects", p->data);
     return STORE_UNFIT;
   }
   return STORE_OK;

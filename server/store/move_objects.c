@@ -18,7 +18,7 @@ enum {
   BATCH = 64,         /* rows; each has at most RESOURCE_OBJECTS objects */
   THREADS = 8,        /* S3 answers one request in some 20 ms, and many at once */
   BLOCK = 1 << 18,    /* bytes read at a time */
-  AWAY_SECONDS = 300, /* for which S3 may be away before the move gives up */
+  AWAY_SECONDS = 300, /* for which S3 may be unreachable before the move gives up */
 };
 
 /* An object of a batch, and what became of it. */
@@ -180,7 +180,7 @@ static int is_away(const depot *d) {
   return d->bucket && bucket_is_away(d->bucket);
 }
 
-/* Waits while S3 is away. */
+/* Waits while S3 is unreachable. */
 static store_result move_item(const object_move *m, item *i) {
   store_result result = move_once(m, i);
   for (int waited = 0; result == STORE_AWAY && waited < AWAY_SECONDS; waited++) {

@@ -25,7 +25,7 @@ typedef struct object_counts {
 
 typedef struct object_move {
   depot from, to;
-  database *rows;    /* of the target, which is complete; its row of an alignment that is left out is deleted */
+  database *rows;    /* of the target, which is complete; its row of an alignment that is omitted is deleted */
   const char *spare; /* a folder for temporary files */
   int again;         /* an earlier run may have sent some */
   void (*tell)(void *user, const object_counts *counts);

@@ -109,7 +109,7 @@ void notices_leave(notices *n, const char *node) {
   }
 }
 
-int notices_keeps_house(notices *n) {
+int notices_does_housekeeping(notices *n) {
   char sql[96];
   snprintf(sql, sizeof sql, "SELECT pg_try_advisory_lock(%d, hashtext(current_schema()))", SQL_LOCK_HOUSE);
   if (n->connected && !n->house) {

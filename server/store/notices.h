@@ -22,6 +22,6 @@ int notices_renew(notices *n, const char *node, int workers, int64_t lease_ms);
 /* Ends the lease: the node no longer runs jobs. */
 void notices_leave(notices *n, const char *node);
 /* Whether this node is the one that does the housekeeping; tries to become it. */
-int notices_keeps_house(notices *n);
+int notices_does_housekeeping(notices *n);
 
 #endif

@@ -63,7 +63,7 @@ static int holds_any(object_lock *l) {
   return holds;
 }
 
-/* Waits for what nodes announced that have lost the lock since. 0: the database is away. */
+/* Waits for what nodes announced that have lost the lock since. 0: the database is unreachable. */
 static int wait_for_deletions(object_lock *l) {
   enum { LOOK_MS = 500 };
   for (int64_t left = 1; left > 0;) {

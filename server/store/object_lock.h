@@ -19,22 +19,22 @@ typedef struct object_lock object_lock;
 
 object_lock *object_lock_open(const char *url); /* NULL: it cannot be opened */
 void object_lock_close(object_lock *l);         /* NULL: nothing */
-/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is away; to be
- * given back nevertheless. */
+/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is unreachable; to
+ * be given back nevertheless. */
 int object_lock_share(object_lock *l);
 void object_lock_unshare(object_lock *l);
 /* The number that this thread's sharing began with; 0: this thread shares no lock. */
 int64_t object_lock_number(void);
 /* Within a transaction, on the connection that writes: SQL_OK if the lock has been held without a gap since a thread
- * began to share it with this number (0: SQL_OK), and nobody deletes before the end of the transaction. SQL_LOST: it
- * has not. */
+ * began to share it with this number (0: SQL_OK); no node deletes before the end of the transaction. SQL_LOST: it has
+ * not been held. */
 int object_lock_check(database *db, int64_t number);
-/* 0: not taken, because others hold it for long, or the database is away. */
+/* 0: not taken, because others hold it for long, or the database is unreachable. */
 int object_lock_exclude(object_lock *l);
 void object_lock_let_go(object_lock *l);
-/* Of who excludes others: announces a deletion. 0: the lock was lost, nothing may be deleted. object_lock_let_go()
- * withdraws it, unless object_lock_keep_announced() was called less than OBJECT_LOCK_DELETES_MS ago: S3 has not
- * answered a request, and later ones that it answers change nothing about that. */
+/* Announces a deletion. The caller holds the lock exclusively. 0: the lock was lost, nothing may be deleted.
+ * object_lock_let_go() withdraws the announcement, unless object_lock_keep_announced() was called less than
+ * OBJECT_LOCK_DELETES_MS ago: then S3 has not answered a request and may still carry it out. */
 enum { OBJECT_LOCK_DELETES_MS = 15000 }; /* three times BUCKET_DELETE_S: the clocks of S3's machines may differ */
 int object_lock_announce(object_lock *l);
 void object_lock_keep_announced(object_lock *l);

@@ -176,7 +176,8 @@ void objects_share(objects *store, object_lock *lock) {
   store->nodes = lock;
 }
 
-/* If the lock cannot be taken, because the database is away, the commit of the row will fail: object_lock_check(). */
+/* If the lock cannot be taken, because the database is unreachable, the commit of the row will fail:
+ * object_lock_check(). */
 void objects_hold(objects *store) {
   pthread_rwlock_rdlock(&store->publishing);
   if (store->nodes) {

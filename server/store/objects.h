@@ -86,15 +86,15 @@ int objects_link(const objects *store, object_kind kind, const char *id, long se
 /* The name of an object in a bucket. */
 enum { OBJECT_NAME = 100 };
 void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]);
-/* id: within the name. 0: it is no name of an object. */
+/* id: points into the name. 0: the name is not that of an object. */
 int objects_read_name(const char *name, object_kind *kind, const char **id);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
 /* Makes the folder of that file, if it is not there. */
 store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
-/* Deletes an object that no row names; called while others are excluded. While a backup runs, S3 is away, or others are
- * excluded no more, it stays until objects_delete_held(). */
+/* Deletes an object that no row names; called while others are excluded. While a backup runs, S3 is unreachable, or
+ * others are excluded no more, it stays until objects_delete_held(). */
 store_result objects_delete(objects *store, object_kind kind, const char *id);
 /* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named:
  * whether a row names the object again; called while other threads are excluded. After a restart of the process the
@@ -121,8 +121,8 @@ int objects_is_marked(const objects *store, object_kind kind, const char *id);
 store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd);
 /* `heal` is called after each object that was moved to quarantine, on the thread that found it, which holds no lock. */
 void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user);
-/* Waits until `heal` has returned for every object that is in quarantine now. Whoever finds a row without its object
- * calls this and looks at the row again: a thread may be about to delete it. Blocks; not within `heal`. */
+/* Waits until `heal` has returned for every object that is in quarantine now. A caller that finds a row without its
+ * object calls this and reads the row again, because a thread may be about to delete it. Blocks; not within `heal`. */
 void objects_settle(objects *store);
 
 /* Whether the file system is mounted read-only, as the kernel does after errors of the disk. */

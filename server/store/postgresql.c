@@ -1,11 +1,11 @@
 /* The driver of PostgreSQL. The SQL that all drivers share has parameters ?1, ?2; this one numbers them $1, $2, and
  * prepares a statement on the server when it is first run: only then are the types of its parameters known. Values go
- * as text. A connection that was lost is made again outside of transactions; one that is lost within a transaction
- * fails it.
+ * as text. The driver reconnects outside of transactions; a connection that is lost within a transaction fails the
+ * transaction.
  *
  * The connection that writes holds an advisory lock, one for each schema, so that one daemon alone works on a
- * catalogue, as the lock of the data folder ensures for SQLite. With the connection it loses the lock. It gets the lock
- * back only if no other daemon has held it meanwhile, which the number `holder` of the catalogue shows. */
+ * catalogue, as the lock of the data folder ensures for SQLite. A lost connection loses the lock. The daemon gets the
+ * lock back only if no other daemon has held it meanwhile, which the number `holder` of the catalogue shows. */
 #include <ctype.h>
 #include <libpq-fe.h>
 #include <stdio.h>
@@ -155,8 +155,8 @@ static int begin(connection *c) {
 /* Whether the last connection that was tried could not be made. __atomic; of all connections of the process. */
 static int away;
 
-/* A connection that the network swallows fails only after seconds: while the server is away, one caller tries at a
- * time.
+/* A connection that the network swallows fails only after seconds: while the server is unreachable, one caller tries at
+ * a time.
  */
 enum { AGAIN_MS = 500 };
 static int64_t tried; /* when a connection was last tried in vain; __atomic */

@@ -73,7 +73,7 @@ typedef struct job_mark {
 /* The marks of jobs whose ids are in a text, separated by commas. */
 int catalogue_job_marks(catalogue *cat, const char *ids, int limit, job_mark *out);
 
-/* Whether jobs run on nodes whose lease has passed. No lease passes while the database is away, nor within one
+/* Whether jobs run on nodes whose lease has passed. No lease passes while the database is unreachable, nor within one
  * lease after it is back. */
 int catalogue_lost_jobs(catalogue *cat, int64_t lease_ms);
 

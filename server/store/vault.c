@@ -143,8 +143,8 @@ static int note_damaged(vault *v, const char *name) {
   return one != NULL;
 }
 
-/* Keeps wrong bytes, and notes their name. Who takes it deletes them from the bucket: this thread may be one that
- * publishes, and cannot exclude others. */
+/* Keeps wrong bytes and notes their name. The thread that takes the name deletes the object from the bucket: this
+ * thread may be a publisher, which cannot exclude others. */
 static void set_damaged(vault *v, const char *name, const char *from) {
   char aside[PATH_MAX];
   if (!note_damaged(v, name)) {

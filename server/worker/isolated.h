@@ -10,12 +10,12 @@ typedef struct isolated_limits {
   int64_t hold_ms; /* see ISOLATED_HOLD_MS */
 } isolated_limits;
 
-/* A process sends what it has made at its end, at once. From its first object on the daemon holds the store, which
- * keeps deletions waiting and, behind them, all who publish. So the next frame must follow within this time: hashing
- * the largest result takes seconds on a busy machine. A process that is late is killed, and counts as one that died. */
+/* A process sends all its results at its end. From the first object on, the daemon holds the store, so deletions wait,
+ * and publishers wait behind them. The next frame must therefore follow within this time: hashing the largest result
+ * takes seconds on a busy machine. The daemon kills a process that is late and counts it as one that died. */
 enum { ISOLATED_HOLD_MS = 30000 };
 
-/* How a process ended that brought neither a result nor a problem. */
+/* How a process ended that sent neither a result nor a problem. */
 typedef struct isolated_end {
   int died;
   int status;    /* as of waitpid(); −1: unknown */

@@ -172,7 +172,7 @@ static const char *why_failed(orb_context *ctx, const api_problem *problem) {
   return problem->name ? problem->name : status != ORB_OK ? orb_status_name(status) : "given back";
 }
 
-/* Whether a job that ran since `began` may have failed because a store was away. */
+/* Whether a job that ran since `began` may have failed because a store was unreachable. */
 static int may_be_store(const run_env *env, int64_t began) {
   return objects_are_away(env->store) || catalogue_was_away(env->cat, began);
 }
@@ -245,7 +245,7 @@ static void crashed(const run_env *env, job *j, const isolated_end *end) {
       &problem, "job-crashed",
       "The process of this job died %d times, the last time because it %s; the job is not retried. Please report "
       "this as a bug, with its meshes.",
-      MOST_CRASHES, end->why);
+      CRASHES_MOST, end->why);
   api_problem_write(&problem, &text);
   queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data);
   api_text_free(&text);

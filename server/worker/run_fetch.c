@@ -1,4 +1,4 @@
-/* A mesh from a URL: downloads the file, then takes it in as an upload is taken in (intake.h).
+/* A mesh from a URL: downloads the file, then handles it like an upload (intake.h).
  *
  * The download comes before the claim, so that a crash of the process while it waits for a server does not make the job
  * suspect. If the process dies between the commit of the mesh and the end of the job, the job runs again and finds the

@@ -77,7 +77,7 @@ function match(mesh, facts) {
   const numbers = shown(mesh, -1).map((p) => numberOf.get(p.map((x) => x + 0).join()));
   assert.ok(
     numbers.every((v) => v !== undefined),
-    'a base position is no vertex of the first shape',
+    'a base position is not a vertex of the first shape',
   );
   for (let s = 1; s < facts.shapes.length; s++) {
     shown(mesh, s - 1).forEach((p, i) => {

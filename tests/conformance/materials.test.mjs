@@ -263,7 +263,7 @@ test('three.js finds the same materials in the asset as in the file; the validat
   assert.match(text, /## Not in the asset\n\n\| what .*\n.*\n\| VENDOR\\_glitter \| materials\\\[0\\\] "rich" \| \S/);
 });
 
-test('an asset without normals leaves out normal maps, and says so', async (t) => {
+test('an asset without normals omits normal maps, and says so', async (t) => {
   const { report, asset } = await merged(t, dressed([{ name: 'bumpy', normalTexture: { index: 1 } }]), {
     asset: { normals: false },
   });

@@ -18,7 +18,7 @@ static void free_problem(api_problem *problem, int fine) {
     api_json_error error;
     cJSON *again = api_json_parse(text.data, text.size, &error);
     if (!again) {
-      abort(); /* a problem that is no JSON */
+      abort(); /* a problem that is not JSON */
     }
     cJSON_Delete(again);
   }

@@ -39,8 +39,8 @@ static void check_cost(const orb_context *ctx, size_t size, size_t multiple, dou
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* The XML of 3MF: an input that is no archive becomes one, whose sum is right, so that changes of it reach the reader.
- * Bytes after a 0 are a second file. */
+/* The XML of 3MF: an input that is not an archive becomes one, whose sum is right, so that changes of it reach the
+ * reader. Bytes after a 0 are a second file. */
 static archive archive_of(const uint8_t *data, size_t size) {
   archive a = {0};
   const uint8_t *end = size ? memchr(data, 0, size) : NULL;

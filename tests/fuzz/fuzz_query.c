@@ -113,7 +113,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   char *trace = next_line(&at), *tags = next_line(&at);
   char *urgency = next_line(&at), *event = next_line(&at), *body = next_line(&at);
   char id[API_ID_SIZE] = "", allow[64], kept[TRACE_SIZE];
-  const route *found = path ? route_find(method, path, id, allow) : NULL;
+  const route *found = path ? api_route_find(method, path, id, allow) : NULL;
   if ((found && found->id >= ROUTE_COUNT) || memchr(id, 0, sizeof id) == NULL) {
     abort();
   }

@@ -1,7 +1,7 @@
 #!/bin/bash
 # Runs scenarios of this version against the daemon of an older one, to see which of them fail there, and why.
 #   tests/long/before.sh PROGRAM SCENARIO…      PROGRAM: the older orbmorphd
-# Options that the older daemon does not know are left out, with their values. Its address space is limited, since some
+# Options that the older daemon does not know are omitted, with their values. Its address space is limited, since some
 # scenarios make it take all memory. ORB_BEFORE_TESTS: only tests whose names match.
 set -euo pipefail
 cd "$(dirname "$0")/../.."

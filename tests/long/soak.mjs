@@ -77,7 +77,7 @@ async function caller() {
       );
       count(asset.status === 200 ? 'assets' : 'assets that are gone');
     }
-    await d.upload('this is no mesh', { name: 'x' });
+    await d.upload('this is not a mesh', { name: 'x' });
     await d.post('/v1/embeddings', '{"mesh":', {});
     await d.get('/v1/meshes', { query: { limit: 50 } });
     await d.get('/metrics');

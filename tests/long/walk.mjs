@@ -25,7 +25,7 @@ const is = async (status, reply) => {
 };
 
 async function meshes() {
-  step('every format, coding and repair; what is no mesh');
+  step('every format, coding and repair; what is not a mesh');
   const egg = shapes.egg(1);
   const bean = shapes.bean(1);
   const kinds = {};

@@ -62,7 +62,7 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
   const beyond = await d.get(supermesh.asset, headers(`bytes=${n}-`));
   assert.equal(beyond.status, 416);
   assert.equal(beyond.headers.get('content-range'), `bytes */${n}`);
-  // Several ranges, and what is no range of bytes, are answered with all of it, as RFC 9110 allows.
+  // Several ranges, and what is not a range of bytes, are answered with all of it, as RFC 9110 allows.
   for (const range of [
     'bytes=0-1,3-4',
     'bytes=5-2',

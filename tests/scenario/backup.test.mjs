@@ -141,7 +141,7 @@ test('a backup and a restore refuse what they would overwrite, and report damage
   for (const [words, why] of [
     [['backup', d.data, '--data', d.data], /is neither empty nor a backup/],
     [['backup', backup, '--data', place], /is not a data folder/],
-    [['restore', d.data, '--data', fresh], /is no complete backup/],
+    [['restore', d.data, '--data', fresh], /is not a complete backup/],
     [['restore', backup, '--data', d.data], /is not empty/],
   ]) {
     const { code, err } = await run(...words);

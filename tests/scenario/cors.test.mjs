@@ -41,7 +41,7 @@ test('named origins may call, others may not', async (t) => {
   }
   for (const origin of [other, `${ours}.evil.example`, ours.slice(0, -1), `${ours}, ${also}`, 'null', undefined]) {
     const reply = await upload(origin);
-    assert.equal(reply.status, origin ? 403 : 200, 'a program that is no browser sends no Origin');
+    assert.equal(reply.status, origin ? 403 : 200, 'a program that is not a browser sends no Origin');
     assert.deepEqual(granted(reply), [], String(origin));
     assert.deepEqual(
       granted(

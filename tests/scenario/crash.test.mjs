@@ -114,7 +114,7 @@ class Ledger {
       const reply = await d.get(url);
       assert.equal(reply.status, 200, `the accepted job ${url} is lost: ${reply.bytes}`);
       const end = await d.ended(reply.json);
-      assert.equal(end.state, 'succeeded', `the end of the daemon is no crash of the job: ${JSON.stringify(end)}`);
+      assert.equal(end.state, 'succeeded', `the end of the daemon is not a crash of the job: ${JSON.stringify(end)}`);
       assert.equal(end.kind, accepted.kind);
       this.jobs.delete(url);
       this.ends.set(url, end.state);

@@ -155,7 +155,7 @@ test('decompression bombs are refused early', async (t) => {
     }
   assert.ok((await memory(d)) - before < 16 << 20, `${(await memory(d)) - before} bytes more`);
   assert.deepEqual(await readdir(path.join(d.data, 'tmp')), []);
-  // Honest repetition within the first megabyte is no bomb.
+  // Honest repetition within the first megabyte is not a bomb.
   assert.equal((await send(d, 'gzip', await gzip(`${shapes.tetrahedron}${'#\n'.repeat(400_000)}`), {})).status, 201);
 });
 

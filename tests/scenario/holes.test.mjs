@@ -41,7 +41,7 @@ for (let i = 0; i < 5; i++) {
   );
 }
 
-/** A hole of more than 48 edges gets a surface with vertices of its own, which are left out again as well. */
+/** A hole of more than 48 edges gets a surface with vertices of its own, which are omitted again as well. */
 const wide = ['bust with a wide hole', cut(shapes.egg(4), away([0.2, -1, 0.1], 70)), 1];
 open.push(wide);
 
@@ -163,7 +163,7 @@ function piecesOf({ positions, triangles }) {
   return [...pieces.values()].sort((a, b) => b.length - a.length).map((list) => ({ positions, triangles: list }));
 }
 
-/** The problem of an open mesh that is no surface with its holes filled, by index.csv, and who is at fault. */
+/** The problem of an open mesh that is not a surface with its holes filled, by index.csv, and who is at fault. */
 function refusalOf(row) {
   if (/^NaN/.test(row.reason)) return ['not-finite', 'vertices'];
   if (row.orientable === 'False') return ['not-orientable', 'edges'];

@@ -235,19 +235,19 @@ test('jobs that waited or ran when the daemon was killed go on', async (t) => {
   }
 });
 
-test('while S3 is away, the move waits', async (t) => {
+test('while S3 is unreachable, the move waits', async (t) => {
   const top = await folder(t);
   const [from, to] = [place(top, 'from'), place(top, 'to')];
   const d = await serve(t, from);
   for (let k = 0; k < 20; k++) assert.equal((await d.upload(mesh(k))).status, 201);
   await d.stop();
-  // A request is tried four times before S3 counts as away.
+  // A request is tried four times before S3 counts as unreachable.
   let asked = 0;
   const proxy = await s3Proxy(t, bucket, () => (++asked > 10 && asked <= 45 ? busy : undefined));
   to.to.push('--objects', `s3://objects/${to.prefix}?endpoint=${proxy.url}`);
   const { code, out, err } = await migrate(from, to);
   assert.equal(code, 0, out + err);
-  assert.match(err, /S3 is away[\s\S]*S3 is back/);
+  assert.match(err, /S3 is unreachable[\s\S]*S3 is back/);
   assert.equal((await list(bucket, 'objects', `${to.prefix}/mesh/`)).length, 20);
 });
 
@@ -342,7 +342,7 @@ test('a target of others, a schema of the future and wrong options are refused, 
   );
   await refused(
     migrate({ from: [...from.from, '--from-objects', cluster.objects] }, fresh('x5')),
-    /leave out --from-objects/,
+    /omit --from-objects/,
   );
   const empty = newCatalogue('nothing');
   await refused(

@@ -263,7 +263,7 @@ test('a node that was paused beyond its lease drops what it made; others have ma
   await c.check();
 });
 
-test('while PostgreSQL is away, requests get 503 and running jobs lose nothing', async (t) => {
+test('while PostgreSQL is unreachable, requests get 503 and running jobs lose nothing', async (t) => {
   const c = new Cluster(t);
   const a = await c.node();
   const ids = [];

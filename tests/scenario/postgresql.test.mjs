@@ -57,7 +57,7 @@ test('a wrong password, a missing database and a read-only one are refused, and 
   assert.ok(!existsSync(path.join(data, 'catalogue.sqlite')));
 });
 
-test('a server that is away is not a wrong configuration', async (t) => {
+test('a server that is unreachable is not a wrong configuration', async (t) => {
   const result = start(await folder(t), 'postgresql:///x?host=/nowhere');
   assert.equal(result.status, 1, result.stderr);
   assert.match(result.stderr, /\/nowhere/);

@@ -114,7 +114,7 @@ test('a recipe in a profile computes the morph that nobody has', async (t) => {
   assert.equal(small.status, 200, small.bytes.toString());
   assert.match(small.headers.get('link'), /rel="describedby"/);
   const float = await d.get(url);
-  assert.equal(idOf(float), idOf(small), 'a profile is no part of the id');
+  assert.equal(idOf(float), idOf(small), 'a profile is not part of the id');
   assert.equal((await d.get('/v1/jobs')).json.jobs.length, 1);
   assert.ok(small.bytes.length < float.bytes.length);
 });

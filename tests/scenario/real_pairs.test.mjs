@@ -51,7 +51,7 @@ test('every pair merges', { skip }, async (t) => {
           morph,
           at.map((place, i) => sources[i].positions[place.vertex]),
         );
-        assert.ok(vertex >= 0, `landmark ${name} is no vertex of the supermesh`);
+        assert.ok(vertex >= 0, `landmark ${name} is not a vertex of the supermesh`);
         used.add(topology.weld[vertex]);
       }
       assert.equal(used.size, pair.landmarks.length);

@@ -171,7 +171,7 @@ test('an object without its hash is not served, and stays: something else may an
   assert.equal((await d.get(`/v1/meshes/${id}/file`)).bytes.toString(), whole);
 });
 
-test('while S3 is away, requests get 503, the cache is served and jobs wait', async (t) => {
+test('while S3 is unreachable, requests get 503, the cache is served and jobs wait', async (t) => {
   const { d, empty } = await stored(t, 'away');
   const dog = await d.mesh(path.join(samples, 'dog.obj'));
   const embedding = await d.made('/v1/embeddings', { mesh: dog.id });
@@ -275,7 +275,7 @@ test('each request that fails is tried again: 503, lost answers, half a body, wr
       proxy.seen.some(({ how }) => how === way),
       way,
     );
-  assert.doesNotMatch(d.log, /S3 is away/);
+  assert.doesNotMatch(d.log, /S3 is unreachable/);
 
   // Bytes that are wrong on the way only: read again, and the object stays.
   for (const way of [short, flipped]) {
@@ -312,7 +312,7 @@ test('a large object goes in parts, each tried again, and is put together once',
   );
   await empty();
   assert.ok((await d.get(`/v1/meshes/${reply.json.id}/file`)).bytes.equals(body));
-  assert.doesNotMatch(d.log, /S3 is away/);
+  assert.doesNotMatch(d.log, /S3 is unreachable/);
 
   // S3 that stays in trouble: the upload is refused, nothing of it stays, and it works later.
   proxy.decide = ({ query }) => (/partNumber=2/.test(query) ? busy : undefined);
@@ -325,7 +325,7 @@ test('a large object goes in parts, each tried again, and is put together once',
   assert.equal((await list(server, 'objects', 'large/mesh/')).length, 2);
 });
 
-test('S3 that does not answer at the start is no wrong configuration: systemd starts the daemon again', async (t) => {
+test('S3 that does not answer at the start is not a wrong configuration: systemd starts the daemon again', async (t) => {
   const data = await folder(t);
   const proxy = await s3Proxy(t, server, () => busy);
   for (const [endpoint, why] of [

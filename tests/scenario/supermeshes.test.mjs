@@ -44,7 +44,7 @@ async function check(d, supermesh, sources, landmarks) {
       morph,
       at.map((place, s) => sources[s].positions[place.vertex]),
     );
-    assert.ok(vertex >= 0, `landmark ${name} is no vertex of the supermesh`);
+    assert.ok(vertex >= 0, `landmark ${name} is not a vertex of the supermesh`);
     used.add(topology.weld[vertex]);
   }
   assert.equal(used.size, landmarks?.length ?? 0);
@@ -146,7 +146,7 @@ test('correspondence without landmarks', async (t) => {
     for (const [s, place] of l.at.entries()) {
       assert.ok(place.triangle < sources[s].triangles.reduce((sum, face) => sum + face.length - 2, 0));
       assert.ok(Math.abs(place.barycentric.reduce((a, b) => a + b) - 1) < 1e-9);
-      // Within the tolerance of the surface, but what was left out of it lets the place slide along it.
+      // Within the tolerance of the surface, but what was omitted from it lets the place slide along it.
       assert.ok(l.residual_relative[s] < 0.01, `${l.name}: ${l.residual_relative}`);
     }
   });

@@ -48,7 +48,7 @@ test('a landmark moved by 0.15 of the diagonal is named, and the true ones are n
   assert.doesNotMatch(clean.said, /misplaced/);
   for (const moved of MOVED) {
     const truth = placed(mesh, landmarks[moved].at[1]);
-    // The vertex whose distance from the true place is nearest to 0.15 of the diagonal, and that is no other landmark.
+    // The vertex whose distance from the true place is nearest to 0.15 of the diagonal, and that is not another landmark.
     const taken = new Set(landmarks.map((l) => l.at[1].vertex));
     const off = mesh.positions.map((p, v) => (taken.has(v) ? Infinity : Math.abs(apart(p, truth) / diagonal - 0.15)));
     const vertex = off.indexOf(Math.min(...off));

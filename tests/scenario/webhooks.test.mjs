@@ -82,7 +82,7 @@ test('the end of a job is announced to the webhook that the request names', asyn
       finished: 0,
     },
   );
-  // The webhook is no part of the id: the same request finds the embedding, and there is no job that would end.
+  // The webhook is not part of the id: the same request finds the embedding, and there is no job that would end.
   const known = await embed(d, { mesh: id, webhook: { url: `${url}/hook` } });
   assert.equal(known.status, 200);
   assert.equal(known.json.url, job.result);

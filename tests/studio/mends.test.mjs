@@ -41,7 +41,7 @@ const filled = (page) => countPixels(page, '.pane-view', (r, g, b) => r - b > 25
 
 test('one button closes all handles, also those that the refusal does not list', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  // bars that get wider: the 20 handles that the refusal leaves out are the longest
+  // bars that get wider: the 20 handles that the refusal omits are the longest
   const surface = grating(12, 10, ([x, y, z]) => [x * (1 + 0.12 * x), y, z]);
   await refused(page, 'grating', surface);
   const alert = page.getByRole('alert');

@@ -286,7 +286,7 @@ test('glTF: accessors of all primitives one after another, after node transforms
   assert.deepEqual([...raw.corners], [...FACES.flat(), ...FACES.flat().map((v) => v + 4)]);
 });
 
-test('what cannot be drawn is left out, and invalid files do not throw', () => {
+test('what cannot be drawn is omitted, and invalid files do not throw', () => {
   const raw = mesh.parseMesh(text('v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\nf 1 2 4\nf 1 2 3\nf 1 2 9\n'));
   assert.deepEqual([...raw.corners], [0, 1, 3]);
   assert.equal(mesh.parseMesh(text('Dear Sir or Madam')).corners.length, 0);

@@ -130,8 +130,8 @@ test('a fit that turns a shape over is said', async () => {
   );
   await landmarked(page);
   await morph(page);
-  const said = await page.getByRole('list', { name: 'Shapes that the fit turned over' }).innerText();
-  assert.match(said, /The fit turned giraffe over: its up axis by 180°/);
+  const said = await page.getByRole('list', { name: 'Shapes that the fit rotated' }).innerText();
+  assert.match(said, /The fit rotated the up axis of giraffe by 180°/);
   await done();
 });
 

@@ -29,7 +29,7 @@ ORDER = [
     "core/transfer", "core/carry", "core/profile", "core/merge", "api",
     "server/log", "server/hash", "server/faults", "server/wake", "server/budget", "server/tasks", "server/metrics", "server/pages", "server/studio",
     "server/trace", "server/net", "server/config", "server/control", "server/systemd", "server/store", "server/isolate", "server/intake", "server/deliver", "server/cache", "server/queue", "server/worker",
-    "server/evict", "server/scrub", "server/maintain", "server/folder_lock", "server/backup", "server/migrate", "server/admin", "server/http", "server/main",
+    "server/evict", "server/scrub", "server/maintain", "server/folder_lock", "server/backup", "server/migrate", "server/admin", "server/http", "server/housekeeping", "server/main",
     "client/cli", "client/js/src", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme", "client/web/src/focus",
     "client/web/src/take", "client/web/src/welcome", "client/web/src/state", "client/web/src/player",
     "client/web/src/actions", "client/web/src/url", "client/web/src/ui",

@@ -5,7 +5,7 @@
 #include "orbmorph/mesh.h"
 
 /* The mesh as text (OBJ), with `count` tubes of three sides and three rings: each joins the rims of two faces that are
- * some faces apart and are left out. Odd ones run outside the body (handles), even ones inside (tunnels). *made: how
+ * some faces apart and are omitted. Odd ones run outside the body (handles), even ones inside (tunnels). *made: how
  * many there was room for. Free with free(). */
 char *handles_stitch(const orb_mesh *mesh, int count, unsigned seed, size_t *size, int *made);
 

@@ -207,26 +207,27 @@ static void test_supermesh_requests(void **state) {
 static void test_routes(void **state) {
   (void)state;
   char id[API_ID_SIZE], allow[64];
-  assert_int_equal(route_find("HEAD", "/v1/meshes/" MESH, id, allow)->id, ROUTE_MESH_GET);
+  assert_int_equal(api_route_find("HEAD", "/v1/meshes/" MESH, id, allow)->id, ROUTE_MESH_GET);
   assert_string_equal(id, MESH);
-  assert_null(route_find("PUT", "/v1/meshes", id, allow));
+  assert_null(api_route_find("PUT", "/v1/meshes", id, allow));
   assert_string_equal(allow, "POST, GET, HEAD");
-  assert_null(route_find("GET", "/v1/meshes/", id, allow));
+  assert_null(api_route_find("GET", "/v1/meshes/", id, allow));
   assert_string_equal(allow, "");
-  assert_null(route_find("GET", "/v1/meshes/../x", id, allow));
+  assert_null(api_route_find("GET", "/v1/meshes/../x", id, allow));
   static const char *const wrong[] = {"", "x", "-1", "01", "100", "1.5", "1/", "1.ply"};
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
     char path[160];
     snprintf(path, sizeof path, "/v1/supermeshes/" MESH "/spheres/%s.ply", wrong[i]);
-    assert_null(route_find("GET", path, id, allow));
+    assert_null(api_route_find("GET", path, id, allow));
   }
-  const route *sphere = route_find("GET", "/v1/supermeshes/" MESH "/spheres/12.ply", id, allow);
+  const route *sphere = api_route_find("GET", "/v1/supermeshes/" MESH "/spheres/12.ply", id, allow);
   assert_int_equal(sphere->id, ROUTE_SUPERMESH_SPHERE);
   assert_string_equal(id, MESH);
-  assert_int_equal(route_number(sphere, "/v1/supermeshes/" MESH "/spheres/12.ply"), 12);
-  assert_int_equal(route_number(sphere, "/v1/supermeshes/" MESH "/spheres/0.ply"), 0);
-  assert_int_equal(route_number(route_find("GET", "/v1/supermeshes/" MESH, id, allow), "/v1/supermeshes/" MESH), -1);
-  assert_null(route_find("GET", "/v1/jobs/" MESH, id, allow));
+  assert_int_equal(api_route_number(sphere, "/v1/supermeshes/" MESH "/spheres/12.ply"), 12);
+  assert_int_equal(api_route_number(sphere, "/v1/supermeshes/" MESH "/spheres/0.ply"), 0);
+  assert_int_equal(api_route_number(api_route_find("GET", "/v1/supermeshes/" MESH, id, allow), "/v1/supermeshes/" MESH),
+                   -1);
+  assert_null(api_route_find("GET", "/v1/jobs/" MESH, id, allow));
 }
 
 /* Stored descriptions may be damaged: counts must be integers that a double represents exactly. */

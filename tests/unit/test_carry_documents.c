@@ -411,7 +411,7 @@ static void many_targets_of_one_name(void **state) {
   orb_buffer_free(ctx, &document);
 }
 
-/* 100 times a character of two bytes, then one that is no UTF-8, which becomes one of three. */
+/* 100 times a character of two bytes, then one that is not UTF-8, which becomes one of three. */
 static void names_are_cut_between_characters(void **state) {
   orb_context *ctx = *state;
   orb_buffer more = {0};

@@ -128,7 +128,7 @@ static void test_placement(void **state) {
   assert_string_equal(mesh.objects[1].name, "right");
   assert_int_equal(mesh.objects[1].first_triangle, 4);
   check_extent(&mesh, 8, 2.0 / 6, 0, 10);
-  /* no build: each object that is no component, once */
+  /* no build: each object that is not a component, once */
   mesh = read_model("><resources>" OBJECT(1, "") "<object id=\"2\"><components><component objectid=\"1\"/>"
                                                  "</components></object></resources><build/>",
                     NULL);
@@ -221,7 +221,7 @@ static void test_errors(void **state) {
        "document type", ORB_E_MALFORMED_MESH},
       {"<model " CORE "><resources>", "well-formed", ORB_E_MALFORMED_MESH},
       {"<model unit=\"mile\" " CORE "/>", "unit \"mile\"", ORB_E_MALFORMED_MESH},
-      {"<html/>", "no 3MF model", ORB_E_MALFORMED_MESH},
+      {"<html/>", "not a 3MF model", ORB_E_MALFORMED_MESH},
       {"<model " CORE "><resources>" OBJECT(1, "") OBJECT(1, "") "</resources></model>", "two resources",
        ORB_E_MALFORMED_MESH},
       {"<model " CORE "><resources><object/></resources></model>", "lacks its attribute \"id\"", ORB_E_MALFORMED_MESH},

@@ -1,4 +1,4 @@
-/* Materials of glTF files: what the reader takes, what it leaves out and says so, and what the asset has of it. */
+/* Materials of glTF files: what the reader takes, what it omits and says so, and what the asset has of it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -107,7 +107,7 @@ static void test_members_are_read(void **state) {
   orb_mesh_free(ctx, &copy);
 }
 
-/* Members that say the default, or have no effect, are no values. */
+/* Members that say the default, or have no effect, are not values. */
 static void test_defaults_are_no_values(void **state) {
   (void)state;
   orb_mesh mesh;
@@ -178,7 +178,7 @@ static void test_set_of_material(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
-/* A long list ends with a count of what it leaves out. */
+/* A long list ends with a count of what it omits. */
 static void test_list_is_bounded(void **state) {
   (void)state;
   for (int count = 97; count <= 300; count += 101) {
@@ -321,7 +321,7 @@ static void test_tangents(void **state) {
   }
 }
 
-/* Without normals there are no tangents, and what needs them is left out and named. */
+/* Without normals there are no tangents, and what needs them is omitted and named. */
 static void test_no_normals(void **state) {
   (void)state;
   synthetic made = synthetic_make(ctx, 2, 2, ellipsoid);

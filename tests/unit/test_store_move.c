@@ -229,7 +229,7 @@ static void test_a_move_goes_on(void **state) {
   check_target(s, MESHES - 1, 1);
 }
 
-/* A damaged alignment is left out with its row: no caller could delete it. */
+/* A damaged alignment is omitted with its row: no caller could delete it. */
 static void test_a_damaged_alignment_is_left_out(void **state) {
   two *s = *state;
   object_counts counts;

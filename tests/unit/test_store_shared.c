@@ -333,8 +333,8 @@ static void test_notices(void **state) {
     notices_wait(n->bell[1], 100, note, changed);
   }
   assert_int_equal(changed[1], 2);
-  assert_true(notices_keeps_house(n->bell[0]));
-  assert_false(notices_keeps_house(n->bell[1]));
+  assert_true(notices_does_housekeeping(n->bell[0]));
+  assert_false(notices_does_housekeeping(n->bell[1]));
 }
 
 static store_result put_mesh(nodes *n, char digit) {

@@ -202,7 +202,7 @@ typedef struct noted {
   int ms, *next, at;
 } noted;
 
-/* Without isolation a suspect is alone, and is no guest: as a guest it would keep all others out after its end. */
+/* Without isolation a suspect is alone, and is not a guest: as a guest it would keep all others out after its end. */
 static void test_a_suspect_is_no_guest(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 2);

@@ -65,7 +65,7 @@ export type Mesh = {
 /** newton: progressive embedding that minimises the symmetric Dirichlet energy. kernel-sampling: Peng and Timalsena, 2016. Default: "newton". */
 export type EmbeddingMethod = 'newton' | 'kernel-sampling';
 
-/** Members that the method does not use are accepted and are part of the id. Responses contain the members that differ from their defaults. */
+/** The daemon accepts members that the method does not use, and they are part of the id. Responses contain the members that differ from their defaults. */
 export type EmbeddingOptions = {
   /** Default: "default". */
   preset?: 'default' | 'fast' | 'quality';
@@ -178,7 +178,7 @@ export type Landmark = {
   radius?: number;
   /** Below 1: the landmark was found, not set. It changes no result. Default: 1. */
   confidence?: number;
-  /** Below 1: the landmark is soft. A spring of stiffness weight / (1 - weight) draws its places together, and they end apart where the map is better for it. For the method pin. Default: 1, exact. */
+  /** Below 1: the landmark is soft. A spring of stiffness weight / (1 - weight) pulls its places together; they stay apart if that improves the map. For the method pin. Default: 1, exact. */
   weight?: number;
 };
 
@@ -206,7 +206,7 @@ export type Landmarks = {
   landmarks: Landmark[];
 };
 
-/** Unknown members are refused by name. Members that a method does not use are accepted and are part of the id. */
+/** The daemon refuses unknown members and names them. It accepts members that a method does not use, and they are part of the id. */
 export type SupermeshRequest = {
   shapes: Array<{
     mesh: Id;
@@ -236,7 +236,7 @@ export type SupermeshRequest = {
     };
   };
   remesh?: {
-    /** With template the vertices and triangles are those of the first shape as uploaded; where that is glTF, the asset is that document with targets added. Default: "adaptive". */
+    /** With template the vertices and triangles are those of the first shape as uploaded; if that is glTF, the asset is that document with targets added. Default: "adaptive". */
     method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
     /** The largest deviation, relative to the diagonal of the bounding box. Default: 0.001. */
     tolerance?: number;
@@ -248,7 +248,7 @@ export type SupermeshRequest = {
     normals?: boolean;
     /** Default: "pingpong". */
     animation?: 'pingpong' | 'none';
-    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files; `shapes[].fit` of the supermesh says which. Default: "auto". */
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto uses a similarity if the frame clearly differs from the first shape's (a scale beyond 1.5, a rotation of more than 30°, or a distance of more than half a diagonal), and otherwise does not move the shape. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files; `shapes[].fit` of the supermesh has the result. Default: "auto". */
     fit?: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. Default: "linear". */
     path?: 'linear' | 'rigid';
@@ -256,17 +256,17 @@ export type SupermeshRequest = {
     path_steps?: number;
     /** Store the colours of later shapes as morphed attributes. Default: false. */
     colors?: boolean;
-    /** Whether holes of the first shape that repair=fill_holes has filled are open in the asset: the triangles that fill them are left out. What cannot be reopened is listed in `dropped`. With template the triangles are always those of the file. Default: "reopen". */
+    /** Whether holes of the first shape that repair=fill_holes has filled are open in the asset, without the triangles that fill them. `dropped` lists holes that cannot be reopened. With template the triangles are always those of the file. Default: "reopen". */
     holes?: 'reopen' | 'filled';
   };
-  /** With the remesh method template and a first shape that came as glTF: what of its document the closed surface consists of. The job is refused (bad-option) where the surface that was uploaded has vertices of another mesh, or none of one that is named; choose the surface at the upload by part=NAME. What is not named stays as it is. */
+  /** With the remesh method template and a first shape in glTF: the meshes of its document that form the closed surface. The job fails (bad-option) if the uploaded surface has vertices of another mesh, or none of a named one; choose the surface at the upload with part=NAME. Other meshes do not change. */
   template?: {
     /** Numbers of meshes of the document. */
     meshes?: number[];
     /** Names of nodes: the meshes that they and the nodes below them show. */
     nodes?: string[];
   };
-  /** What the asset gets from the shapes besides their surfaces, at the same places: the skin with its skeleton, fitted to the first shape, and its animations; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job is refused (bad-option) if a shape does not have what is asked of it. `transferred` of the supermesh lists what the asset got. An asset that got anything but targets has the profile float only. */
+  /** What orbmorph copies from the shapes to the asset besides their surfaces, place by place: the skin with its skeleton, fitted to the first shape, and its animations; all sets of colours of vertices, or of texture coordinates, each as the next COLOR_n or TEXCOORD_n that is free; the morph targets of the file; or the base colour textures, baked into the texture coordinates of the first shape and offered as a variant (KHR_materials_variants). An asset can have one skin. The job fails (bad-option) if a shape lacks what an entry names. `transferred` of the supermesh lists what was copied. An asset with anything but targets copied has only the profile float. */
   transfer?: Array<{
     /** The shape, from 0 in their order. */
     from: number;
@@ -277,7 +277,7 @@ export type SupermeshRequest = {
   webhook?: WebhookRequest;
 };
 
-/** The request with every member written out; of the embedding options, those that are not default. Sending it again names the same supermesh. */
+/** The request with all members; of the embedding options, those that are not default. Sending it again requests the same supermesh. */
 export type CanonicalRequest = {
   shapes: Array<{
     mesh: Id;
@@ -319,7 +319,7 @@ export type CanonicalRequest = {
   asset: {
     normals: boolean;
     animation: 'pingpong' | 'none';
-    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files; `shapes[].fit` of the supermesh says which. */
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto uses a similarity if the frame clearly differs from the first shape's (a scale beyond 1.5, a rotation of more than 30°, or a distance of more than half a diagonal), and otherwise does not move the shape. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files; `shapes[].fit` of the supermesh has the result. */
     fit: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. */
     path: 'linear' | 'rigid';
@@ -330,14 +330,14 @@ export type CanonicalRequest = {
     /** Whether holes of the first shape that a repair has filled are open in the asset. */
     holes: 'reopen' | 'filled';
   };
-  /** Only where the request has it. */
+  /** Only if the request has it. */
   template?: {
     /** Numbers of meshes of the document. */
     meshes: number[];
     /** Names of nodes: the meshes that they and the nodes below them show. */
     nodes: string[];
   };
-  /** Only where the request has it. */
+  /** Only if the request has it. */
   transfer?: Array<{
     /** The shape, from 0 in their order. */
     from: number;
@@ -348,7 +348,7 @@ export type CanonicalRequest = {
 };
 
 export type ProfileBounds = {
-  /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound, to be added to hausdorff_relative. */
+  /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound; add it to hausdorff_relative. */
   quantization_relative: number | null;
   /** The largest angle between a normal and that of the float asset, at every weight from 0 to 1 of one target: a proved bound, below 1. 0 without normals. */
   normal_degrees: number | null;
@@ -359,9 +359,9 @@ export type Supermesh = {
   url: string;
   asset: string;
   asset_bytes: number;
-  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh, and where the asset is an uploaded glTF document or got anything but targets by `transfer`: these have the profile float only. */
+  /** How much the profiles quantized and meshopt change: the bounds of both, and those of each. Absent if an older engine made the supermesh, and for assets with only the profile float: uploaded glTF documents, and those to which `transfer` copied anything but targets. */
   profiles?: {
-    /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound, to be added to hausdorff_relative. */
+    /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound; add it to hausdorff_relative. */
     quantization_relative: number | null;
     /** The largest angle between a normal and that of the float asset, at every weight from 0 to 1 of one target: a proved bound, below 1. 0 without normals. */
     normal_degrees: number | null;
@@ -409,7 +409,7 @@ export type Supermesh = {
       /** 1 if it kept the size. */
       scale: number;
       rotation_degrees: number;
-      /** How far the shape moved: the mean of its fitted points, by the first shape's diagonal. */
+      /** The distance that the mean of the shape's fitted points moved, divided by the first shape's diagonal. */
       translation_relative: number;
       /** The angle by which the y axis rotated. Beyond 60° the shape lay down or stood up. */
       up_degrees: number;
@@ -453,13 +453,13 @@ export type Supermesh = {
   }>;
   /** How far you can rely on the correspondence that orbmorph found; with more than two shapes, bend, clear and lead are each the worst of all maps. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
   match?: {
-    /** From 0 to 1, calibrated on pairs of shapes: of the matches with 0.8 or more, all 41 were right. Lower values rank matches but are not probabilities. */
+    /** From 0 to 1, calibrated on pairs of shapes: every measured match with 0.8 or more was right (docs/bench-confidence.md). Lower values rank matches but are not probabilities. */
     confidence: number;
     /** `sure` from a confidence of 0.8 on, `likely` from 0.5 on, else `unsure`. */
     verdict: 'sure' | 'likely' | 'unsure';
     /** From 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs. */
     clear: number;
-    /** The bend of the nearest other rough map, divided by that of the best one; half of the cost of their rotations in space is included. About 1 where a shape looks alike from several sides and no match stands out; such a match is never `sure`. */
+    /** The bend of the nearest other rough map, divided by that of the best one; both include half of the cost of the rotation in space. About 1 if a shape looks alike from several sides, so that no match stands out; such a match is never `sure`. */
     lead: number;
     /** How much the best rough map bends the shapes: 0 for a rigid motion. */
     bend: number;
@@ -468,7 +468,7 @@ export type Supermesh = {
   alternatives?: Array<{
     /** How much its rough map bends the shapes, as a multiple of the best one's. */
     cost: number;
-    /** The later shape that it matches otherwise; the others are matched as in this supermesh. Absent if an older engine made the supermesh. */
+    /** The later shape that it matches differently; the others are matched as in this supermesh. Absent if an older engine made the supermesh. */
     shape?: number;
     request: CanonicalRequest;
   }>;
@@ -496,7 +496,7 @@ export type Supermesh = {
     distortion: Distortion;
     /** The share of the supermesh's triangles that are inverted on either shape: they face away from the smooth normals of the surface at their corners and from its face at their centre. */
     inverted_fraction: number | null;
-    /** Their number. Absent if an older engine made the supermesh. */
+    /** The number of inverted triangles. Absent if an older engine made the supermesh. */
     inverted_count?: number;
     /** With the method `template`: the largest of them, as triangles of the file of the first shape, counted from 0 after polygons are cut into triangles; the largest first. Empty with other methods. Absent if an older engine made the supermesh. */
     inverted_triangles?: number[];
@@ -533,7 +533,7 @@ export type Supermesh = {
   }>;
   /** The energy of the alignment; null if it was not measured. */
   energy: number | null;
-  /** What the files have and the asset lacks: parts of the first shape's materials, and data that no new document has, such as skins. With the remesh method template an uploaded glTF document stays, and lacks almost nothing. The last entry of a long list counts the rest. */
+  /** What the files have and the asset lacks: parts of the first shape's materials, and data that no new document has, such as skins. With the remesh method template an uploaded glTF document is kept, and the list is mostly empty. The last entry of a long list counts the rest. */
   dropped: Array<{
     /** The part. */
     what: string;
@@ -542,7 +542,7 @@ export type Supermesh = {
     /** The reason. */
     why: string;
   }>;
-  /** What `transfer` has given the asset. Only where the request has it. */
+  /** What `transfer` copied to the asset. Only if the request has it. */
   transferred?: Array<{
     /** The shape. */
     from: number;
@@ -606,11 +606,11 @@ export type Job = {
   finished: Instant | null;
 };
 
-/** Where the end of the job is announced. Part of the job, not of the id of its result. */
+/** The daemon announces the end of the job to this URL. The webhook belongs to the job, not to the id of its result. */
 export type WebhookRequest = {
   /** https://, or http:// to an address that the operator has listed. */
   url: string;
-  /** What is announced. Default: all of them. */
+  /** The ends that are announced. Default: all of them. */
   events?: Array<'succeeded' | 'failed' | 'cancelled'>;
 };
 
@@ -705,14 +705,14 @@ export type JobPage = {
 };
 
 export type Usage = {
-  /** Empty for what was made without a token. */
+  /** Empty for resources made without a token. */
   tenant: string;
   meshes: number;
   /** Of its meshes and landmarks. */
   bytes: number;
   /** Of embeddings, supermeshes and kept alignments that its jobs made. */
   derived_bytes: number;
-  /** Those of the caller's token; of other tenants, the least of their tokens. 0: no limit. */
+  /** The limits of the caller's token; for other tenants, the smallest of their tokens. 0: no limit. */
   quotas: {
     bytes: number;
     derived_bytes: number;
@@ -723,7 +723,7 @@ export type Usage = {
   running: number;
   /** Other unfinished jobs, with the embeddings that supermeshes wait for. */
   queued: number;
-  /** Time for which workers had its jobs, those that failed included. */
+  /** The time that workers spent on its jobs, failed ones included. */
   worker_seconds: number;
   /** Processes that died at its work, until the operator clears them. */
   crashes: number;
@@ -767,7 +767,7 @@ export type Ready = {
   read_only?: boolean;
 };
 
-/** What is wrong with the stored data: as the last complete round of the scrub found it, but for quarantined. */
+/** Damage of the stored data, as the last complete round of the scrub found it; quarantined counts up to now. */
 export type Integrity = {
   /** damaged: SQLite's quick_check found damage; /readyz then answers 503. */
   catalogue: 'ok' | 'damaged';
@@ -818,7 +818,7 @@ export type ProblemMalformedJson = {
 export type DocumentElement = {
   /** Its place, such as meshes[0] or nodes[3]. */
   where: string;
-  /** As the document names it; absent where it does not. */
+  /** Its name in the document; absent if it has none. */
   name?: string;
 };
 
@@ -829,7 +829,7 @@ export type ProblemMalformedMesh = {
   status: 400;
   /** What is wrong and what to do. */
   detail: string;
-  /** The line of a text file, from 1; the last line if something is missing. */
+  /** The line of a text file, from 1; the last line if the file ends too early. */
   line: number;
 } | {
   type: '/problems/malformed-mesh';
@@ -911,7 +911,7 @@ export type ProblemForeignOrigin = {
   status: 403;
   /** What is wrong and what to do. */
   detail: string;
-  /** The Origin header; absent where the browser sent none. */
+  /** The Origin header; absent if the browser sent none. */
   origin?: string;
 };
 
@@ -985,7 +985,7 @@ export type ProblemTooLarge = {
   detail: string;
   /** The limit in bytes, if the body exceeds it. */
   limit?: number;
-  /** The line of a text file, from 1; the last line if something is missing. */
+  /** The line of a text file, from 1; the last line if the file ends too early. */
   line?: number;
   /** The offset in bytes. */
   offset?: number;
@@ -1005,7 +1005,7 @@ export type ProblemUnknownFormat = {
   status: 415;
   /** What is wrong and what to do. */
   detail: string;
-  /** The line of a text file, from 1; the last line if something is missing. */
+  /** The line of a text file, from 1; the last line if the file ends too early. */
   line?: number;
   /** The offset in bytes. */
   offset?: number;
@@ -1140,7 +1140,7 @@ export type ProblemNotFinite = {
   status: 422;
   /** What is wrong and what to do. */
   detail: string;
-  /** The line of a text file, from 1; the last line if something is missing. */
+  /** The line of a text file, from 1; the last line if the file ends too early. */
   line?: number;
   /** The offset in bytes. */
   offset?: number;

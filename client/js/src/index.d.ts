@@ -149,7 +149,7 @@ export interface ListOptions extends RequestOptions {
   mesh?: string;
   /** Only supermeshes with a shape of this name. */
   name?: string;
-  /** For supermeshes: "summary" leaves out report and request. */
+  /** For supermeshes: "summary" omits report and request. */
   view?: 'full' | 'summary';
 }
 /** An entry of a list. */

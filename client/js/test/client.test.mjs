@@ -267,7 +267,7 @@ test('an upload is repeated as well', async () => {
   assert.deepEqual([mesh.id, asked.length], ['x', 2]);
 });
 
-test('a daemon that does not let the page in is told apart from one that is away', async (t) => {
+test('a daemon that does not let the page in is told apart from one that is unreachable', async (t) => {
   t.after(() => delete globalThis.location);
   globalThis.location = { origin: 'https://page.example', protocol: 'https:' };
   const failing = (livez) => async (url, init) => {

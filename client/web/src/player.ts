@@ -89,7 +89,7 @@ class Player {
 
   /** of the targets, as they are shown */
   weights: ArrayLike<number> = [];
-  /** without those of targets that are no shapes */
+  /** without those of targets that are not shapes */
   private way: ArrayLike<number> = [];
 
   private setWeights(way: ArrayLike<number>) {
@@ -101,7 +101,7 @@ class Player {
     stage.draw();
   }
 
-  /** Sets the weight of a target that is no shape, wherever the morph is. */
+  /** Sets the weight of a target that is not a shape, wherever the morph is. */
   setExtra(number: number, weight: number) {
     if (!this.result) return;
     this.result.extras[number] = weight;

@@ -124,7 +124,7 @@ export interface Result {
   data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles' | 'looks' | 'extras'>;
   /** which of the looks is shown */
   look: number;
-  /** the weights of the targets that are no shapes, as they are shown */
+  /** the weights of the targets that are not shapes, as they are shown */
   extras: number[];
   main: Model;
   each: Model[];

@@ -4,7 +4,7 @@
  * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), go=1: the job is sent once the fast
  * one is computed, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
  * cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: of its materials, e: the weights of its
- * targets that are no shapes.
+ * targets that are not shapes.
  */
 import type { Place } from 'orbmorph';
 import {
@@ -96,7 +96,7 @@ function encodeMatch(): string {
   return [best.id, shown?.at ?? 0, ...(next ? [next.at] : [])].join(',');
 }
 
-/** The weights of the targets that are no shapes, unless they are those of the asset. */
+/** The weights of the targets that are not shapes, unless they are those of the asset. */
 function encodeExtras(): string {
   const { data, extras = [] } = state.result ?? {};
   return data?.extras.some(({ weight }, i) => weight !== extras[i]) ? extras.map(round).join(',') : '';

@@ -9,14 +9,14 @@
  *   params.h  all thresholds
  *
  * Decimated copies of both shapes are registered to each other along each rough map, in both directions
- * (elastic/elastic.h). The maps come from the eigenfunctions (spectral/spectral.h), which do not mind a pose, and from
- * rotations of the spheres (align/rotate/correlate.h), which do not mind other proportions. A map of the right limbs
- * bends the copies least, and it may be off at their tips; a twin (left and right swapped with front and back) bends
- * them more, and often also rotates them in space.
+ * (elastic/elastic.h). The maps come from the eigenfunctions (spectral/spectral.h), which hardly depend on the pose,
+ * and from rotations of the spheres (align/rotate/correlate.h), which hardly depend on proportions. A map of the right
+ * limbs bends the copies least, even if it is off at their tips. A twin (left and right swapped with front and back)
+ * bends them more, and often also rotates them in space.
  *
- * Rejected: ranking candidates by the energy of their composed maps on the coarse copies. It depends on how a walk
- * went: one right map came to 4.05, and to 1.37 with its tips shifted a little, which is as much as right and wrong
- * differ. */
+ * Rejected: ranking candidates by the energy of their composed maps on the coarse copies. That energy depends on the
+ * course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by no
+ * more than that. */
 #ifndef ORB_ALIGN_FIND_MATCH_H
 #define ORB_ALIGN_FIND_MATCH_H
 
@@ -45,8 +45,8 @@ typedef struct orb_match {
   double bend;  /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
   double cost;  /* its bend, times 1 to 1 + ORB_FIND_TURN_COST for its rotation in space */
   double clear; /* 0 to 1: how far the next best map that differs is behind */
-  double lead;  /* how many times as much as the best map the one nearest to it bends the shapes, half of their
-                   rotations in space counted: about 1 where a shape looks alike from several sides */
+  double lead; /* how much the nearest other map bends the shapes, divided by the same for the best one; both count half
+                  of the rotation in space. About 1 where a shape looks alike from several sides */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
@@ -54,17 +54,17 @@ typedef struct orb_match {
   orb_match_search *search; /* the candidates, for the two functions below */
 } orb_match;
 
-/* hint: NULL, or landmarks: then there is a match only if they say that the shapes are one in two poses, and only maps
- * that take them near their partners count. Free `out` in any case. About 1 s of one thread, whatever the size; trials
- * run on all threads, and the result has the same bytes for any number of them. */
+/* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
+ * poses, and only maps count that take them near their partners. Free `out` in any case. About 1 s of one thread,
+ * whatever the size; trials run on all threads, and the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
 /* The target of other[k], which the caller frees: NULL on failure. The meshes of the match must still be there. About
  * 0.4 s of one thread. */
 ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);
-/* Makes other[k] the best map, and the one that was best the first of the others. target: its own, which the match owns
- * from then on, also after a failure. clear: how far the other one is behind by what has decided.
- * By their bends neither leads. */
+/* Makes other[k] the best map; the former best map becomes the first of the others. target: that of other[k]; the match
+ * takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that decided.
+ * Sets lead to 1, because the bends contradict the choice. */
 ORB_MUST_CHECK orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear);
 /* The confidence in a match, 0 to 1, from its bend, its `clear`, its `lead` and the energy of the map that followed it:
  * calibrated from 0.8 on (docs/bench-confidence.md). */

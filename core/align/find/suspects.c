@@ -6,7 +6,8 @@
  * A landmark's share of the distortion is that of the map's triangles nearer to it than to any other landmark.
  *
  * Rejected: aligning coarse copies without each of the landmarks. The energies of two such maps differ by more than a
- * landmark costs: without one of 21 true landmarks, 2.26 fell to 1.69 or rose to 3.70, and it took 0.6 s each. */
+ * misplaced landmark costs: without one of 21 true landmarks, 2.26 fell to 1.69 or rose to 3.70, and it took 0.6 s
+ * each. */
 #include "align/find/suspects.h"
 
 #include <math.h>

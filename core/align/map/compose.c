@@ -11,7 +11,7 @@
  *
  * With landmarks, the caller asks for the quick way first (walked.c): a landmark walk, optimised on a coarse level and
  * refined. For shapes in other poses, it then asks for a map without the landmarks, and for the same map with them
- * (starts/shift.c). Where neither comes to a map, there are three kinds of starts:
+ * (starts/shift.c). Where neither gives a map, there are three kinds of starts:
  * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c), which
  *   samples by eigenfunctions guide where they agree with the landmarks (starts/spectral_samples.c). This is good where
  *   it folds little. Flips are allowed against a growing barrier until untangling clears nearly all; collapses clear
@@ -30,7 +30,7 @@
  * A large shape is not moved as a whole: it is the fixed one, or a decimated copy of it has its map already, which is
  * refined (lifted.c).
  *
- * Soft landmarks are pinned first, as all are. Then the map is let go where they were, and springs hold them instead.
+ * Soft landmarks are pinned first, as all are. Then they are released, and springs hold them instead.
  */
 #include "align/map/compose.h"
 

@@ -6,7 +6,7 @@
  * energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no pass helps, the
  * map is drawn to the given targets.
  *
- * Where that comes to no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
+ * Where that gives no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
  * and is optimised on a coarse level, so several are tried, and the best one is refined. Pairs of the match that are
  * pinned (auto.c) come last: they take several times as long. */
 #include "align/map/targets.h"

@@ -8,7 +8,7 @@
 #include "base/check.h"
 #include "base/memory.h"
 
-/* Frees what the barriers have locked in, until that brings nothing any more. */
+/* Frees vertices that the barriers have locked, until that no longer helps. */
 static orb_status loosen(orb_map_run *c, orb_map_level *l, int most) {
   const orb_map_params *p = &c->params;
   for (int i = 0, idle = 0; i < most && idle < 2; i++) {

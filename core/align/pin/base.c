@@ -14,6 +14,13 @@ enum {
   FRAMES = 40, /* rotations of the octahedron that are tried; chosen by trial */
   PASSES = 60  /* of edge flips; a guard against rounding */
 };
+/* Radians by which the phases of two vectors grow from frame to frame and from axis to axis, and a first phase. Any
+ * values do that spread the frames: no multiple of one is near a multiple of 2π. */
+static const double FIRST_BY_FRAME = 1.3, FIRST_BY_AXIS = 2.1, FIRST_PHASE = 0.4;
+static const double SECOND_BY_FRAME = 2.7, SECOND_BY_AXIS = 1.7;
+/* Six times the volume of the tetrahedron of two triangles, of points on the unit sphere: an edge flip that gains less
+ * would only follow rounding. */
+static const double LEAST_GAIN = 1e-12;
 
 static const int32_t OCTAHEDRON[24] = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4, 2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
 
@@ -24,8 +31,8 @@ static const double *point_of(const orb_sheet *s, int32_t v) {
 /* Frame `number` of a fixed sequence of orthonormal frames. */
 static void frame_of(int number, double axes[3][3]) {
   for (int k = 0; k < 3; k++) {
-    axes[0][k] = sin(1.3 * number + 2.1 * k + 0.4);
-    axes[1][k] = cos(2.7 * number + 1.7 * k);
+    axes[0][k] = sin(FIRST_BY_FRAME * number + FIRST_BY_AXIS * k + FIRST_PHASE);
+    axes[1][k] = cos(SECOND_BY_FRAME * number + SECOND_BY_AXIS * k);
   }
   orb_normalize(axes[0]);
   orb_cross(axes[0], axes[1], axes[2]);
@@ -90,7 +97,7 @@ static int should_flip(const orb_sheet *s, int32_t h) {
   orb_sub(point_of(s, c), point_of(s, a), v);
   orb_sub(point_of(s, d), point_of(s, a), w);
   orb_cross(u, v, n);
-  return orb_dot(n, w) > 1e-12 && positive(s, a, d, c) && positive(s, d, b, c);
+  return orb_dot(n, w) > LEAST_GAIN && positive(s, a, d, c) && positive(s, d, b, c);
 }
 
 /* Lawson's edge flips. They end without the bound on passes, except for rounding. */

@@ -156,7 +156,7 @@ static int spread_path(patcher *p, int32_t b) {
         total += length;
         edges++;
       } else {
-        sum += 0.5 * length / (total + 1e-300) + 0.5 / edges;
+        sum += 0.5 * length / (total + ORB_TINY) + 0.5 / edges;
       }
       if (v == p->at[to]) {
         break;
@@ -180,7 +180,7 @@ static double cotangent(const double *apex, const double *a, const double *b) {
   orb_sub(a, apex, u);
   orb_sub(b, apex, v);
   orb_cross(u, v, n);
-  return orb_dot(u, v) / (orb_length(n) + 1e-300);
+  return orb_dot(u, v) / (orb_length(n) + ORB_TINY);
 }
 
 static orb_status set_border(patcher *p, int *good) {

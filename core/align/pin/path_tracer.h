@@ -40,7 +40,7 @@ void orb_path_tracer_gates(orb_path_tracer *tracer, int32_t v, int32_t first, in
 ORB_MUST_CHECK orb_status orb_path_tracer_search(orb_path_tracer *tracer, int32_t from, int32_t to, int *found);
 
 /* Raises lower bounds of the lengths of paths from one end, through any gates, to all others. End k is the vertex v
- * with mark[v] = k (−1: no end; vertices from mark_count on are no ends); distance[k] rises to the true length, or to
+ * with mark[v] = k (−1: no end; vertices from mark_count on are not ends); distance[k] rises to the true length, or to
  * the radius if that is less. */
 ORB_MUST_CHECK orb_status orb_path_tracer_ball(orb_path_tracer *tracer, int32_t from, double radius,
                                                const int32_t *mark, int32_t mark_count, double *distance,

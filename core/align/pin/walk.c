@@ -3,7 +3,7 @@
  * All shapes are decimated with their landmarks kept, and embedded up to a level of a few hundred vertices. There
  * rotations bring the landmarks together, and their spherical means become targets. Each step moves a landmark along
  * the great circle, as far as no triangle around it shrinks below a share of its size; sweeps of the other vertices
- * make room between the steps. When no landmark advances any more, the level is refined and the walk goes on: more
+ * make room between the steps. When landmarks no longer advance, the level is refined and the walk continues: more
  * vertices give more freedom. Once all have arrived they are pinned, and the refinement continues to the full meshes.
  */
 #include <math.h>
@@ -32,7 +32,8 @@ static const double LEAST_SHARE = 0.6;  /* that a determinant keeps in one step 
 static const double SHORTER = 0.6;      /* a try's length relative to the one before it */
 static const double NO_PROGRESS = 1e-4; /* chords of all landmarks in one step: less ends the level */
 static const double SETTLED = 0.002;    /* gain of the energy by SWEEPS sweeps that ends settling */
-static const double TOO_NEAR = 1e-16;   /* squared chord: nearer targets count as one place */
+static const double CENTRAL = 1e-3;   /* a chord that passes this near to the centre of the sphere gives no direction */
+static const double TOO_NEAR = 1e-16; /* squared chord: nearer targets count as one place */
 
 typedef struct walker {
   orb_context *ctx;
@@ -181,7 +182,7 @@ static double step_one(walker *w, int32_t k, const double target[3], int *arrive
     for (int c = 0; c < 3; c++) {
       x[c] = i == 0 ? target[c] : p[c] + t * (target[c] - p[c]);
     }
-    if (i > 0 && orb_normalize(x) < 1e-3) {
+    if (i > 0 && orb_normalize(x) < CENTRAL) {
       continue;
     }
     if (may_stand(w, k, p, x)) {

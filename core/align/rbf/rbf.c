@@ -32,6 +32,8 @@ enum {
   RELAX_SWEEPS = 20 /* of a relaxation */
 };
 static const double DEFAULT_RADIUS = 1.0; /* chord on the unit sphere: a sixth of the circumference */
+static const double LAST_SHARE = 1e-9; /* of the way: less is rounding of the sum of steps, and belongs to the last */
+static const double LEAST_MEAN = 1e-3; /* length of a mean of unit vectors: opposite points have no shorter one */
 
 typedef struct rbf_run {
   orb_context *ctx;
@@ -111,7 +113,7 @@ static orb_status refuse(const rbf_run *r) {
 static orb_status warp_shape(rbf_run *r, int32_t steps) {
   double done = 0, step = 1.0 / steps;
   for (int halvings = 0, relaxations = 0; done < 1;) {
-    double share = done + step >= 1 - 1e-9 ? 1 : step / (1 - done);
+    double share = done + step >= 1 - LAST_SHARE ? 1 : step / (1 - done);
     int good = 0;
     ORB_TRY(try_step(r, share, &good));
     ORB_TRY(orb_context_check(r->ctx));
@@ -150,7 +152,7 @@ static void set_targets(const orb_sheet *sheets, int32_t shape_count, const int3
       }
     }
     memcpy(target, one_way || met ? first : sum, 3 * sizeof *target);
-    if (!one_way && !met && orb_normalize(target) < 1e-3 * shape_count) {
+    if (!one_way && !met && orb_normalize(target) < LEAST_MEAN * shape_count) {
       memcpy(target, first, 3 * sizeof *target);
     }
   }

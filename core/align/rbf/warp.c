@@ -10,7 +10,8 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
-enum { GRAIN = 512 }; /* points of one task */
+enum { GRAIN = 512 };                   /* points of one task */
+static const double LEAST_PIVOT = 1e-6; /* of the Gram matrix: centres within 0.001 of a plane do not span space */
 
 double orb_warp_phi(double r) {
   if (r >= 1) {
@@ -39,7 +40,7 @@ static int spans(const double *centres, int32_t count) {
     }
   }
   for (int i = 0; i < 4; i++) {
-    if (g[i][i] < 1e-6) {
+    if (g[i][i] < LEAST_PIVOT) {
       return 0;
     }
     for (int j = i + 1; j < 4; j++) {

@@ -10,7 +10,7 @@ double orb_warp_phi(double r);
 
 /* Displacement field d(v) = Σ φ(|v − p_k| / radius_k) c_k + P(v), P linear, that takes centres p to p + moves. Side
  * conditions Σ c_k = 0, Σ c_k p_kᵀ = 0. Where the centres do not determine a linear polynomial (fewer than four, or all
- * in one plane) P is left out. */
+ * in one plane) P is omitted. */
 typedef struct orb_warp {
   int32_t count;
   double *centres, *coefficients, *radii; /* 3, 3 and 1 a centre */

@@ -34,7 +34,9 @@ enum {
 static const double APART = 0.8;   /* radians: rotations this far apart are different candidates */
 static const double NORMALS = 0.3; /* variance of the normals where that of the positions is 1 */
 static const double FIRST_STEP = 0.12, LAST_STEP = 0.002; /* radians of the pattern search */
-enum { MOVES = 8 };                                       /* most rounds of it with one step */
+static const double LEAST_CUBE =
+    1e-9;           /* added to the cubed distance of a chord from the centre, by which areas are divided */
+enum { MOVES = 8 }; /* most rounds of it with one step */
 static const double UPRIGHT = 0.15; /* relative: an upright rotation may score less than the best by this share */
 static const double GOLDEN_ANGLE = 2.399963229728653; /* π (3 − √5): between neighbours of a Fibonacci lattice */
 
@@ -92,7 +94,7 @@ static void splat(field *f, const orb_aligned_shape *shape, int32_t t) {
       for (int k = 0; k < 3; k++) {
         q[k] = c * p[0][k] + a * p[1][k] + b * p[2][k];
       }
-      double r2 = orb_dot(q, q), density = area / (r2 * sqrt(r2) + 1e-9);
+      double r2 = orb_dot(q, q), density = area / (r2 * sqrt(r2) + LEAST_CUBE);
       int32_t cell = cell_of(f->side, q);
       f->weight[cell] += density;
       for (int k = 0; k < 3; k++) {
@@ -129,7 +131,8 @@ static void field_make(field *f, int side, const orb_aligned_shape *shape) {
       normal_variance += f->weight[c] * f->value[c][3 + k] * f->value[c][3 + k];
     }
   }
-  double scale = sqrt(total / (variance + 1e-300)), scale_normal = sqrt(NORMALS * total / (normal_variance + 1e-300));
+  double scale = sqrt(total / (variance + ORB_TINY)),
+         scale_normal = sqrt(NORMALS * total / (normal_variance + ORB_TINY));
   for (int32_t c = 0; c < cell_count(f); c++) {
     f->weight[c] /= total;
     for (int k = 0; k < 3; k++) {

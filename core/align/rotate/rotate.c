@@ -13,6 +13,7 @@
 #include "numeric/vec3.h"
 
 static const double SPREAD = 0.03; /* second singular value of directions that span a plane: 10° off their axis */
+static const double NUDGE = 1e-9;  /* radians between attempts: rotations this near differ in how they round */
 enum { ATTEMPTS = 12 };            /* rotations that are tried until the rounded result is certified */
 
 /* Do the landmarks of a shape determine its rotation: do they span a plane as directions? */
@@ -65,8 +66,7 @@ orb_status orb_sheet_rotate(orb_context *ctx, orb_sheet *sheet, const double rot
   orb_status status = ORB_OK;
   orb_certificate certificate = {0};
   for (int attempt = 0; attempt < ATTEMPTS && !certificate.valid && status == ORB_OK; attempt++) {
-    /* Rotations that differ by nanoradians round differently. */
-    double angle = 1e-9 * attempt, nudge[9] = {1, -angle, angle / 2, angle, 1, -angle / 3, -angle / 2, angle / 3, 1};
+    double angle = NUDGE * attempt, nudge[9] = {1, -angle, angle / 2, angle, 1, -angle / 3, -angle / 2, angle / 3, 1};
     for (int32_t v = 0; v < vertices; v++) {
       double *p = points + 3 * (size_t)v;
       orb_rotate_point(rotation, old + 3 * (size_t)v, p);

@@ -38,7 +38,7 @@ double orb_fatness(const double a[3], const double b[3], const double c[3]) {
   double ab = orb_distance2(a, b), bc = orb_distance2(b, c), ca = orb_distance2(c, a);
   double longest = ab > bc ? ab : bc;
   longest = longest > ca ? longest : ca;
-  return orb_det(a, b, c) / (longest + 1e-300);
+  return orb_det(a, b, c) / (longest + ORB_TINY);
 }
 
 static const double *point_of(const orb_sheet *s, int32_t v) {

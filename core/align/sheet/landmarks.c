@@ -16,6 +16,9 @@ static const double SNAP = 2e-7;     /* a landmark this near to an edge or corne
 static const double NEGATIVE = 1e-6; /* rounding below zero that is accepted, */
 static const double OFF_ONE = 1e-5;  /* and of their sum */
 
+/* Ways of a vertex towards the mean of its ring, as shares: from one that hardly moves it, in steps of this factor. */
+static const double FIRST_WAY = 1e-6, WAY_GROWTH = 4;
+
 /* Vertex `vertex` lies in given triangle `triangle` at `at`. */
 typedef struct anchor {
   int32_t vertex, triangle;
@@ -115,7 +118,7 @@ static int settle(orb_sheet *s, int32_t vertex) {
     h = orb_sheet_swing(s, h);
   } while (h != start);
   orb_normalize(mean);
-  for (double step = 1e-6; step <= 1; step *= 4) {
+  for (double step = FIRST_WAY; step <= 1; step *= WAY_GROWTH) {
     for (int k = 0; k < 3; k++) {
       p[k] = old[k] + step * (mean[k] - old[k]);
     }

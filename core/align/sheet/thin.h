@@ -1,4 +1,4 @@
-/* Thinning: removes vertices that splits made and that nothing needs any more. */
+/* Thinning: removes vertices that splits made and that are no longer needed. */
 #ifndef ORB_ALIGN_SHEET_THIN_H
 #define ORB_ALIGN_SHEET_THIN_H
 

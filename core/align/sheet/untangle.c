@@ -17,6 +17,8 @@ enum {
   RINGS = 6,  /* around the flips that may move: 0, then one more each time, less than this */
   ROUNDS = 24 /* of moves for each number of rings, if vertices still move */
 };
+/* Share of the way to a goal that a move tries: the whole, then halves, as long as they exceed this. */
+static const double LEAST_WAY = 0.04;
 
 static int is_flipped(const orb_sheet *s, int32_t t) {
   const int32_t *tri = s->shape.mesh.triangles + 3 * (size_t)t;
@@ -32,7 +34,7 @@ static double least_height(const orb_sheet *s, int32_t v, const double x[3], dou
   double least = INFINITY;
   do {
     const double *a = p + 3 * (size_t)tri[orb_next(h)], *b = p + 3 * (size_t)tri[orb_prev(h)];
-    double edge = sqrt(orb_distance2(a, b)), height = orb_det(x, a, b) / (edge + 1e-300);
+    double edge = sqrt(orb_distance2(a, b)), height = orb_det(x, a, b) / (edge + ORB_TINY);
     if (height < least) {
       least = height;
       if (away) {
@@ -74,7 +76,7 @@ static int improve(orb_sheet *s, int32_t v) {
   }
   orb_normalize(goal[2]);
   for (int g = 0; g < 3; g++) {
-    for (double t = 1; t > 0.04; t *= 0.5) {
+    for (double t = 1; t > LEAST_WAY; t *= 0.5) {
       double x[3];
       for (int k = 0; k < 3; k++) {
         x[k] = p[k] + t * (goal[g][k] - p[k]);
@@ -142,7 +144,7 @@ orb_status orb_untangle(orb_context *ctx, orb_sheet *sheet, const unsigned char 
   *left = count_flipped(sheet);
   for (int rings = 0; *left > 0 && rings < RINGS; rings++) {
     int32_t count = gather(sheet, held, rings, near, list);
-    for (int round = 0, moved = 1; moved && round < ROUNDS && (*left > 0); round++) {
+    for (int round = 0, moved = 1; moved && round<ROUNDS && * left> 0; round++) {
       moved = 0;
       for (int32_t i = 0; i < count; i++) {
         moved |= improve(sheet, list[i]);

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/loops.h"
 #include "base/memory.h"
+#include "numeric/vec3.h"
 
 enum {
   MORTON_BITS = 10, /* of each coordinate; 30 bits sort in three passes */
@@ -276,16 +277,6 @@ static orb_status link_triangles(setup *w) {
   return ORB_OK;
 }
 
-static double triangle_area(const double *a, const double *b, const double *c) {
-  double u[3], w[3];
-  for (int k = 0; k < 3; k++) {
-    u[k] = b[k] - a[k];
-    w[k] = c[k] - a[k];
-  }
-  double x = u[1] * w[2] - u[2] * w[1], y = u[2] * w[0] - u[0] * w[2], z = u[0] * w[1] - u[1] * w[0];
-  return 0.5 * sqrt(x * x + y * y + z * z);
-}
-
 static void measure_areas(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   setup *w = arg;
@@ -293,8 +284,8 @@ static void measure_areas(void *arg, int64_t begin, int64_t end, int thread) {
   double sum = 0;
   for (int64_t t = begin; t < end; t++) {
     const int32_t *v = s->corner + orb_triangle_corner(t);
-    double area = triangle_area(s->position + 3 * (int64_t)v[0], s->position + 3 * (int64_t)v[1],
-                                s->position + 3 * (int64_t)v[2]);
+    double area = orb_triangle_area(s->position + 3 * (int64_t)v[0], s->position + 3 * (int64_t)v[1],
+                                    s->position + 3 * (int64_t)v[2]);
     orb_corner_set_area(w->s, orb_triangle_corner(t), (float)area);
     sum += area;
   }

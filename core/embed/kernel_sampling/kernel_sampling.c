@@ -254,7 +254,7 @@ static orb_status place(orb_ks_run *run, int32_t v, int32_t parent, int *found) 
   return ORB_OK;
 }
 
-/* Enlists so many rings around the one vertex that is enlisted; poles among them are left out unless `poles`. */
+/* Enlists so many rings around the one vertex that is enlisted; poles among them are omitted unless `poles`. */
 static void enlist_rings(orb_ks_run *run, int32_t rings, int poles) {
   for (int32_t r = 0; r < rings; r++) {
     for (int32_t i = 0, end = run->next_count; i < end; i++) {

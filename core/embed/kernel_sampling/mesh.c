@@ -23,12 +23,8 @@ void orb_ks_mesh_free(orb_context *ctx, orb_ks_mesh *m) {
 
 /* The area of the triangle of half-edge h on the coarse mesh. */
 static double triangle_area(const orb_ks_mesh *m, int32_t h) {
-  const double *p = m->x + 3 * (size_t)m->tri[h];
-  double u[3], w[3], n[3];
-  orb_sub(m->x + 3 * (size_t)orb_ks_head(m, h), p, u);
-  orb_sub(m->x + 3 * (size_t)m->tri[orb_prev(h)], p, w);
-  orb_cross(u, w, n);
-  return 0.5 * orb_length(n);
+  return orb_triangle_area(m->x + 3 * (size_t)m->tri[h], m->x + 3 * (size_t)orb_ks_head(m, h),
+                           m->x + 3 * (size_t)m->tri[orb_prev(h)]);
 }
 
 orb_status orb_ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *x, orb_ks_mesh *out) {

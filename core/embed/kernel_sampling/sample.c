@@ -206,7 +206,7 @@ static inline __attribute__((always_inline)) double add_term(const orb_ks_ring *
   double inverse = 0.5 * r->inverse_area[i], least = INFINITY, angle[LANES], area[LANES], shape[LANES];
   for (int32_t l = 0; l < count; l++) {
     double nx = u->y[l] * w->z[l] - u->z[l] * w->y[l], ny = u->z[l] * w->x[l] - u->x[l] * w->z[l];
-    double nz = u->x[l] * w->y[l] - u->y[l] * w->x[l], n2 = nx * nx + ny * ny + nz * nz + 1e-300;
+    double nz = u->x[l] * w->y[l] - u->y[l] * w->x[l], n2 = nx * nx + ny * ny + nz * nz + ORB_TINY;
     double c2 = u->square[l], b2 = w->square[l], b = w->length[l], c = u->length[l], inv = 1 / n2;
     double doubled = sqrt(n2);
     angle[l] = 0.5 * (mp * (b2 + c2 - a2) + mq * (a2 + c2 - b2) + mr * (a2 + b2 - c2)) * doubled * inv;
@@ -269,7 +269,7 @@ ORB_CLONES static void spread(const double (*pair)[2], int32_t pairs, double dra
   for (int32_t l = 0; l < pairs; l++) {
     double s = pair[l][0], t = pair[l][1];
     double px = apex[0] + s * qx + t * wx, py = apex[1] + s * qy + t * wy, pz = apex[2] + s * qz + t * wz;
-    double f = 1 / sqrt(px * px + py * py + pz * pz + 1e-300);
+    double f = 1 / sqrt(px * px + py * py + pz * pz + ORB_TINY);
     x[l] = px * f;
     y[l] = py * f;
     z[l] = pz * f;
@@ -297,7 +297,7 @@ double orb_ks_error_at(const orb_ks_sampler *s, const double p[3]) {
     double a = r->side[i], a2 = r->side2[i], mp = r->angle_p[i], mq = r->angle_q[i], mr = r->angle_r[i];
     orb_sub(r->point[i + 1 < r->count ? i + 1 : 0], p, w);
     orb_cross(u, w, n);
-    double n2 = orb_dot(n, n) + 1e-300, doubled = sqrt(n2), b2 = orb_dot(w, w), b = sqrt(b2);
+    double n2 = orb_dot(n, n) + ORB_TINY, doubled = sqrt(n2), b2 = orb_dot(w, w), b = sqrt(b2);
     double angle = 0.5 * (mp * (b2 + c2 - a2) + mq * (a2 + c2 - b2) + mr * (a2 + b2 - c2)) / doubled;
     double ratio = 0.5 * r->inverse_area[i] * doubled;
     error += angle * raise(ratio + 1 / ratio, s->area_exponent) *

@@ -43,7 +43,7 @@ static scaling scale_to(double bound, double area_exponent, double aspect_expone
 
 static orb_ks_edge edge_of(const orb_ks_ring *r, int32_t i, const double apex[3], double inv_radius, scaling c) {
   int32_t j = i + 1 < r->count ? i + 1 : 0;
-  double q[3], w[3], length = orb_length(r->plane[i]) + 1e-300;
+  double q[3], w[3], length = orb_length(r->plane[i]) + ORB_TINY;
   orb_sub(r->point[i], apex, q);
   orb_sub(r->point[j], apex, w);
   orb_ks_edge e;
@@ -294,7 +294,7 @@ static void run_widest(const orb_ks_sampler *s, search *q) {
 
 int orb_ks_search(orb_ks_sampler *s, const double apex[3], double draw, double bound, double out[3], double *error) {
   const orb_ks_ring *r = &s->ring;
-  double radius2 = 1e-300;
+  double radius2 = ORB_TINY;
   for (int32_t i = 0; i < r->count; i++) {
     double d2 = orb_distance2(r->point[i], apex);
     radius2 = d2 > radius2 ? d2 : radius2;

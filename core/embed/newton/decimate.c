@@ -34,7 +34,7 @@ enum {
   FAILS_UNTIL_COSTLY = 2, /* … any target that keeps the link condition will do */
   FAILS_UNTIL_ALL = 30,   /* … the threshold is infinite */
   FAILS_UNTIL_KEPT = 40,  /* … the vertices to keep may go too */
-  FAILS_MOST = 60         /* … the surface is no sphere */
+  FAILS_MOST = 60         /* … the surface is not a sphere */
 };
 
 typedef struct ring {

@@ -13,19 +13,19 @@ ORB_API void orb_align_defaults(orb_align_options *options);
 /* Aligns shape_count ≥ 1 shapes; the points of the first stay unless the method says otherwise. Every result is
  * certified.
  *
- * - rotate: rotations only. With landmarks, by generalised Procrustes (Peng & Timalsena 2016, section 7.1); without, by
- *   a search over SO(3) for the rotation under which the map between the shapes is nearest to a rigid motion. Where
- *   landmarks leave the rotation around an axis open (one or two landmarks, or all on one axis), the search finds it.
- *   The same holds in pin and rbf.
+ * - rotate: rotations only. With landmarks, generalised Procrustes (Peng & Timalsena 2016, section 7.1) gives them;
+ * without, a search over SO(3) finds the rotation under which the map between the shapes is nearest to a rigid motion.
+ * Where landmarks leave the rotation around an axis open (one or two landmarks, or all on one axis), the search finds
+ * it. The same holds in pin and rbf.
  * - rbf: after the rotations, the warp of the paper (section 7.2), in rbf_steps steps a pass, to the spherical means;
- *   one_way: to the first shape's points. The influence of a landmark ends at its radius. A step that folds is
+ *   with one_way, to the first shape's points. The influence of a landmark ends at its radius. A step that folds is
  *   untangled locally. If that fails, the step is halved several times; if that fails too, the sphere is relaxed before
  *   it. Landmarks that still do not get past each other meet as in pin, where edges are split.
  * - pin: embeds the shapes anew with the landmarks as constraints, which meet at their spherical means. Where landmarks
  *   would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's points or at
  *   new ones. After pin and rbf the vertices of a landmark have bit-equal points on all shapes.
- * - auto: pin if there are landmarks. Without landmarks, auto searches for rotations. Then it matches each later shape
- *   with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both shapes
+ * - auto: pin if there are landmarks. Without landmarks, auto first searches for rotations, then matches each later
+ * shape with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both shapes
  *   least. The composed map sends each vertex to where the match takes it. The preset fast only searches for rotations.
  *   `found` shows what was matched.
  *

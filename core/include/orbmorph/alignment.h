@@ -18,8 +18,9 @@ typedef struct orb_landmark {
   double radius;       /* rbf: radius of its influence, as a chord of the unit sphere; 0: rbf_radius */
   double confidence;   /* of a found landmark, 0 to 1; 1 for a given one */
   double weight;       /* 0 or 1: its places meet exactly. Between: it is soft, and a spring of stiffness
-                          weight / (1 − weight) draws its places together. At 0.5 they end a distance d apart where that
-                          lowers the energy by d², in radii of a ball of the shape's area. For pin and auto */
+                          weight / (1 − weight) pulls its places together. At 0.5 the places stay a distance d apart only
+                          if that lowers the energy by d²; d is in radii of a ball with the shape's area. For pin and
+                          auto */
 } orb_landmark;
 
 typedef struct orb_align_options {
@@ -50,12 +51,12 @@ typedef struct orb_aligned_shape {
 
 enum { ORB_FOUND_MAX = 12, ORB_ALTERNATIVES_MAX = 4, ORB_ALTERNATIVE_PAIRS = 12 };
 
-/* Another correspondence that the search without landmarks considered. One later shape is matched otherwise, all others
- * as in the best one. Its places lead to it if they are given as landmarks. They are found, so they are only roughly at
- * the same features. */
+/* Another correspondence that the search without landmarks considered. It matches one later shape differently, and all
+ * others as the best one does. To request it, give its places as landmarks. The search found these places, so they mark
+ * the same features only roughly. */
 typedef struct orb_alternative {
   double cost;   /* how much its rough map bends the shapes, as a multiple of the best one's: at least 1 */
-  int32_t shape; /* the later shape that is matched otherwise */
+  int32_t shape; /* the later shape that is matched differently */
   int32_t count; /* at most ORB_ALTERNATIVE_PAIRS */
   orb_place *at; /* count × shape_count places, on the given meshes */
 } orb_alternative;
@@ -67,9 +68,9 @@ typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
   double bend;         /* of the best rough map: 0 for a rigid motion */
   double clear;        /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
-  double lead;         /* how many times as much as the best rough map the nearest other one bends the shapes, half of
-                          their rotations in space counted. About 1: the shapes do not tell which is right, as where
-                          one looks alike from several sides. At most 100 */
+  double lead;         /* how much the nearest other rough map bends the shapes, divided by the same for the best one;
+                          both count half of the rotation in space. About 1: the shapes do not decide which is right,
+                          for example because one looks alike from several sides. At most 100 */
   double confidence;   /* 0 to 1, with the mean energy; calibrated on two shapes and from 0.8 on
                           (docs/bench-confidence.md) */
 } orb_match_facts;

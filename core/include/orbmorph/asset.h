@@ -8,10 +8,10 @@
 extern "C" {
 #endif
 
-/* AUTO: SIMILARITY for the shapes whose frame clearly differs from the first one's: larger or smaller by more than 1.5,
- * rotated by more than 30°, or farther away than half the diagonal of the first shape; NONE for the others.
- * A rotation that differs from one by right angles by 30° or less, and fits hardly better, is replaced by that one:
- * files have other axes, and shapes other postures. */
+/* AUTO: SIMILARITY for the shapes whose frame clearly differs from the first one's: larger or smaller by a factor of
+ * more than 1.5, rotated by more than 30°, or farther away than half the diagonal of the first shape; NONE for the
+ * others. If a rotation by right angles lies within 30° of the best rotation and fits nearly as well, AUTO uses it:
+ * such differences come from the axes of the file, and smaller ones from the posture of the shape. */
 typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY, ORB_FIT_AUTO } orb_fit;
 typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } orb_animation;
 typedef enum orb_holes { ORB_HOLES_REOPEN = 0, ORB_HOLES_FILLED } orb_holes;
@@ -30,8 +30,7 @@ typedef struct orb_asset_options {
   orb_path path;
   int32_t path_steps; /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours, 3 */
   int colors;         /* also write the colours of the later shapes, as morphed attributes; 0 */
-  orb_holes holes;    /* REOPEN: leave out the triangles that fill holes of the first shape, where the supermesh has
-                         their rims */
+  orb_holes holes; /* REOPEN: omit the triangles that fill holes of the first shape, if the supermesh has their rims */
   /* split_count lists of a number for each corner of the supermesh: corners share a vertex of the file only if their
      numbers agree in every list. The lists that are NULL are skipped. */
   const int32_t *const *splits;
@@ -47,7 +46,7 @@ typedef struct orb_asset_facts {
   int32_t triangle_count;     /* without those that fill holes which are open again */
   int32_t primitive_count;    /* one for each material that is used */
   int32_t target_count;       /* later shapes, then in-betweens, then those of the options */
-  int32_t morphed_attributes; /* over all targets; glTF requires clients to support only 8 at once */
+  int32_t morphed_attributes; /* of all targets together; glTF requires clients to support only 8 at once */
   int32_t nudged_vertices;    /* moved by units in the last place to keep them distinct, see orb_asset_write() */
 } orb_asset_facts;
 
@@ -71,8 +70,8 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_su
                                                   const orb_asset_options *options, orb_asset_facts *facts,
                                                   orb_buffer *out);
 
-/* Lists what the asset lacks of the files of its shapes: *list (allocated from the context, freed by the caller; NULL
- * if empty) has *count entries, at most ORB_DROPPED_MAX. Free *list on an error, too. */
+/* Lists what the files of the shapes have and the asset does not: *list (allocated from the context, freed by the
+ * caller; NULL if empty) has *count entries, at most ORB_DROPPED_MAX. Free *list on an error, too. */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_dropped(orb_context *ctx, const orb_aligned_shape *shapes,
                                                     int32_t shape_count, const orb_asset_options *options,
                                                     orb_dropped **list, int32_t *count);
@@ -82,7 +81,7 @@ typedef struct orb_fit_report {
   double scale, rotation_degrees;
   double translation_relative; /* distance that the mean of the shape's fitted points moves, divided by the first
                                   shape's diagonal */
-  double up_degrees;           /* angle by which the y axis turns */
+  double up_degrees;           /* angle by which the y axis is rotated */
 } orb_fit_report;
 
 /* How orb_asset_write() moves each shape: 16 doubles a shape, column-major as in glTF, which take the shape's own
@@ -100,7 +99,7 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write_mapped(orb_context *ctx, const
                                                          orb_buffer *out, int32_t **vertices);
 
 /* As orb_asset_write_mapped(), for a supermesh of ORB_REMESH_TEMPLATE: the vertices and triangles of the base are those
- * of `file`, the first shape as orb_mesh_read() gave it, before repairs. Nothing is welded, nudged or left out; a
+ * of `file`, the first shape as orb_mesh_read() gave it, before repairs. Nothing is welded, nudged or omitted; a
  * vertex whose corners have several texture coordinates, normals or colours gets copies after the others. Triangles
  * keep their order within their material, and there is a primitive for each material. Vertices of the file that are not
  * on the closed surface stay where they are in every target; their entry in *vertices is −1. No tangents and no colours
@@ -119,11 +118,11 @@ typedef struct orb_document {
 } orb_document;
 
 /* As orb_asset_write_template(), where the first shape came as glTF or GLB: appends that document as a GLB, with
- * targets added to the meshes that the closed surface consists of. The bytes of its first buffer stay, and so does all
- * else: nodes, skins, weights, materials, animations, extensions. Existing targets come first; mesh.extras.firstShape
- * is the number of the first target that is a shape. Where such a mesh is compressed, the document is unpacked, and
- * says so in *list. Targets are in the coordinates of each mesh. *vertices: those of the triangle primitives of all
- * meshes, one after another.
+ * targets added to the meshes that form the closed surface. The bytes of its first buffer do not change, nor does
+ * anything else: nodes, skins, weights, materials, animations, extensions. Existing targets come first;
+ * mesh.extras.firstShape is the number of the first target that is a shape. Where such a mesh is compressed, the
+ * document is unpacked, and says so in *list. Targets are in the coordinates of each mesh. *vertices: those of the
+ * triangle primitives of all meshes, one after another.
  *
  * *list (allocated from the context, freed by the caller, NULL if empty) has *count entries: what the asset lacks. Free
  * it on an error, too. ORB_E_BAD_OPTION: the document cannot be kept; the message says why. */

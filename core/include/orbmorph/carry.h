@@ -1,5 +1,5 @@
-/* What the shapes have besides a surface, carried onto the supermesh by places: a skin, colours, texture coordinates,
- * morph targets, and textures. */
+/* Carrying what shapes have besides a surface to the supermesh: a skin, colours, texture coordinates, morph targets,
+ * and textures. */
 #ifndef ORBMORPH_CARRY_H
 #define ORBMORPH_CARRY_H
 

@@ -24,7 +24,7 @@ enum { ORB_ERROR_ITEMS = 100, ORB_ERROR_LOOP_VERTICES = 16384 };
 /* A part of a glTF document. */
 typedef struct orb_error_element {
   char where[32]; /* such as "meshes[0]" */
-  char name[64];  /* as the document names it; "": not at all */
+  char name[64];  /* its name in the document; "": none */
 } orb_error_element;
 
 /* The facts of a failure. Numbers that do not apply are −1, counts 0. Vertex numbers are those of the file. */
@@ -59,7 +59,7 @@ typedef struct orb_error {
 } orb_error;
 
 /* Called with the stage ("simplify", "embed", …) and the fraction of that stage that is done, 0 to 1. Any thread of the
- * context may call it, but never two at a time; it must return at once. */
+ * context may call it, but never two at a time; it must return quickly. */
 typedef void (*orb_progress_fn)(void *user, const char *stage, double fraction);
 
 /* Where memory comes from; both NULL: malloc() and free(). Tests use it to fail the n-th allocation. Any thread of the

@@ -21,7 +21,7 @@ typedef struct orb_certificate {
  * orientations; exact integers decide the rest. The degree is a signed count of the triangles that cover one direction
  * in general position. (The sum of solid angles / 4π is the same number, but only up to rounding.) Every triangle at
  * a point that is not finite counts as degenerate. The result is in out->valid; the call itself fails only if memory
- * runs out or it is cancelled. O(F). */
+ * runs out or the caller cancels it. O(F). */
 ORB_API ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
                                               const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
 

@@ -1,7 +1,7 @@
-/* The mesh formats, a row each: the identifier in C and its value, the beginning of the names of its functions in core,
- * and the name in requests, options and reports. The enumeration orb_format, the table of readers and their prototypes
- * are made from this list. The first row wins where two detectors are equally sure, so strict formats come first; a new
- * format takes the next value.
+/* The mesh formats, one row each: the identifier in C and its value, the beginning of the names of its functions in
+ * core, and the name in requests, options and reports. The enumeration orb_format, the table of readers and their
+ * prototypes follow from this list. If two detectors are equally sure, the first row wins, so strict formats come
+ * first. A new format takes the next value.
  *
  * Use: #define WORD(id, value, function, name) name, … ORB_FORMATS(WORD) */
 #ifndef ORBMORPH_FORMATS_H

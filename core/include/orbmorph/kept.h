@@ -1,4 +1,4 @@
-/* Alignments as bytes, so that they can be kept: a merge with other remesh or asset options needs no new alignment. */
+/* Storing alignments as bytes: a merge with other remesh or asset options can then reuse the alignment. */
 #ifndef ORBMORPH_KEPT_H
 #define ORBMORPH_KEPT_H
 

@@ -19,8 +19,8 @@ ORB_API ORB_MUST_CHECK orb_status orb_locator_create(orb_context *ctx, const dou
 ORB_API void orb_locator_destroy(orb_context *ctx, orb_locator *locator);
 
 /* The triangle that holds the direction p (unit), and the barycentric coordinates of p in it by central projection.
- * hint: a triangle near p, or −1. Exact predicates decide, so the result is correct even on edges; of several triangles
- * it is the one with the lowest number, whatever the hint. */
+ * hint: a triangle near p, or −1. Exact predicates decide, so the result is correct even on edges. If several triangles
+ * hold p, the result is the one with the lowest number, whatever the hint. */
 ORB_API void orb_locate(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out);
 
 #ifdef __cplusplus

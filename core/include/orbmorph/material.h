@@ -1,4 +1,4 @@
-/* Materials of a mesh, as glTF 2.0 and its material extensions define them, and what a file has that cannot be kept. */
+/* Materials of a mesh, as glTF 2.0 and its material extensions define them, and what a file has that is lost. */
 #ifndef ORBMORPH_MATERIAL_H
 #define ORBMORPH_MATERIAL_H
 

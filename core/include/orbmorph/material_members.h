@@ -1,5 +1,5 @@
 /* What a material may have besides its base colour, metalness and roughness: a row for each member that glTF 2.0 and
- * its material extensions define. Reader, asset and writer are made from this list, whose order is the order in the
+ * its material extensions define. Reader, asset and writer follow from this list, whose order is the order in the
  * asset: members of glTF itself by name, then the extensions by name.
  *
  * MEMBER(id, extension, name, kind, low, high, needs)

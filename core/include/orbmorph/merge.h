@@ -18,7 +18,8 @@ typedef struct orb_merge_options {
   orb_asset_options asset;
   /* ORB_REMESH_TEMPLATE: the first shape as orb_mesh_read() gave it, before repairs; NULL: after repairs. */
   const orb_mesh *file;
-  /* With it, where it came as glTF or GLB: its bytes, whose document the asset then is. NULL: a new document. */
+  /* If that file is glTF or GLB: its bytes; the asset is then this document with targets added. NULL: a new document.
+   */
   const unsigned char *file_bytes;
   size_t file_size;
   orb_document_parts file_parts; /* see orb_document */
@@ -33,9 +34,9 @@ typedef struct orb_merge_timings {
   double align, remesh, transfer, write, total; /* seconds */
 } orb_merge_timings;
 
-/* Distortion of the composed map from shape a to shape b, a < b. It leaves out the triangles of the supermesh that are
- * slivers on a or b (height below about a ninetieth of the longest side), unless nearly all are. There is a report for
- * each pair of up to four shapes; for more shapes, for each pair of neighbours in their order. */
+/* Distortion of the composed map from shape a to shape b, a < b. Triangles of the supermesh that are slivers
+ * on a or b (height below about a ninetieth of the longest side) do not count, unless nearly all are. Up to four shapes
+ * have a report for each pair; more shapes have one for each pair of neighbours in their order. */
 enum { ORB_INVERTED_LISTED = 32 };
 
 typedef struct orb_pair_report {
@@ -58,7 +59,7 @@ enum { ORB_WARNING_PARTS = 4, ORB_WARNING_TRIANGLES = 32 };
 typedef enum orb_warning_kind {
   ORB_WARNING_STRETCHED, /* the symmetric Dirichlet energy is above 20 on more than 1 % of the area */
   ORB_WARNING_THIN       /* patches keep less than half of their area halfway through the linear morph, after a fit by
-                            similarity: the map twists a limb there, or the pose turns it far */
+                            similarity: the map twists a limb there, or the pose rotates it far */
 } orb_warning_kind;
 
 /* A connected part of what a warning is about. Index 0 is shape a of the pair, 1 shape b. */
@@ -103,8 +104,8 @@ typedef struct orb_merge_result {
   /* found_count × shape_count: for each found landmark, the distance from its place to the point of the supermesh
    * that lies at the landmark's point on the sphere. */
   double *found_residuals;
-  /* found_count: what a found landmark lies on, where the geometry of the first shape says it: "head", "tail",
-   * "left front limb" and so on, literals; NULL: not clear. No name occurs twice. */
+  /* found_count: the part of the first shape on which a found landmark lies, by its geometry: "head", "tail",
+   * "left front limb" and so on, literals; NULL: not clear. Names are unique. */
   const char **found_names;
   int32_t pair_count;
   orb_pair_report *pairs;
@@ -122,7 +123,7 @@ typedef struct orb_merge_result {
   int32_t carried_count;
   orb_carried *carried;                     /* what the options asked to carry, in the order of the asset */
   int has_profiles;                         /* 0: a kept document, or more than targets was carried onto the asset */
-  orb_profile_facts profiles[ORB_PROFILES]; /* what the profiles of the asset change; that of float is 0 */
+  orb_profile_facts profiles[ORB_PROFILES]; /* how much each profile changes the asset; 0 for float */
   orb_merge_timings timings;
 } orb_merge_result;
 
@@ -133,13 +134,14 @@ typedef struct orb_merge_result {
 ORB_API ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                                             int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_merge_options *options, orb_merge_result *out);
-/* What orb_merge() would refuse because of the options or of the files: it calls this first, so that such a refusal
- * comes before the work. The error names the shape, the entry of `carries` and the parts of the glTF document at fault.
- * A document is read once more, in memory of its size. */
+/* Returns the error that orb_merge() would return because of the options or the files. orb_merge() calls this function
+ * before it starts the work. The error names the shape, the entry of `carries` and the parts of the glTF document at
+ * fault. A document is read once more, in memory of its size. */
 ORB_API ORB_MUST_CHECK orb_status orb_merge_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                                   const orb_merge_options *options);
 /* Merges with an alignment that orb_align() or orb_alignment_read() gave for these shapes and landmarks. The result is
- * that of orb_merge(), but timings.align is 0. Takes *alignment over and zeroes it, also on an error. */
+ * that of orb_merge(), except that timings.align is 0. Takes ownership of *alignment and zeroes it, also on an error.
+ */
 ORB_API ORB_MUST_CHECK orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes,
                                                     const char *const *names, int32_t shape_count,
                                                     const orb_landmark *landmarks, orb_alignment *alignment,

@@ -39,16 +39,16 @@ typedef struct orb_object {
   char name[ORB_PART_NAME]; /* UTF-8 without control characters; longer names are cut */
 } orb_object;
 
-/* In source_triangle, where a repair made the triangle: it fills a hole of the file; or it covers what another repair
- * has opened (close_handles, split_nonmanifold). */
+/* In source_triangle, for a triangle that a repair made: FILL fills a hole of the file, COVER closes what another
+ * repair (close_handles, split_nonmanifold) opened. */
 enum { ORB_MADE_FILL = -1, ORB_MADE_COVER = -2 };
 
-/* What of a document the closed surface consists of: meshes by number, and the meshes of nodes by name, with those of
- * the nodes below them. */
+/* The meshes of a document that form the closed surface: meshes by number, and nodes by name. A node stands for its
+ * mesh and those of the nodes below it. */
 typedef struct orb_document_parts {
   const int32_t *meshes;
   const char *const *nodes;
-  int32_t mesh_count, node_count; /* both 0: whatever the surface has */
+  int32_t mesh_count, node_count; /* both 0: every mesh that the surface uses */
 } orb_document_parts;
 
 /* A mesh. The context owns all arrays; optional ones are NULL where the file has none. */
@@ -109,7 +109,7 @@ typedef struct orb_topology {
   int orientable; /* a consistent facing exists */
 } orb_topology;
 
-/* Measures any list of triangles, even if it is not a surface. O(V + F) expected. */
+/* Measures any list of triangles, also one that does not form a surface. O(V + F) expected. */
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_topology(orb_context *ctx, const orb_mesh *mesh, orb_topology *out);
 
 /* Limits of coordinates: their largest magnitude; the least diagonal of the bounding box; and the least diagonal as a

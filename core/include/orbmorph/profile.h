@@ -11,7 +11,7 @@ extern "C" {
 typedef enum orb_profile {
   ORB_PROFILE_FLOAT = 0, /* as orb_asset_write() writes it */
   ORB_PROFILE_QUANTIZED, /* KHR_mesh_quantization */
-  ORB_PROFILE_MESHOPT,   /* that, and EXT_meshopt_compression without a fallback */
+  ORB_PROFILE_MESHOPT,   /* QUANTIZED with EXT_meshopt_compression, without a fallback */
   ORB_PROFILES
 } orb_profile;
 
@@ -32,8 +32,8 @@ typedef struct orb_profile_facts {
 } orb_profile_facts;
 
 /* Appends an asset of orb_asset_write() in another profile. The triangles and vertices come in another order, which is
- * better for the caches of vertices and for compression. The one node gets a scale and a translation, which take the
- * integers of positions to their places. Equal assets give equal bytes.
+ * better for the caches of vertices and for compression. The one node gets a scale and a translation, which map the
+ * integer positions to coordinates. Equal assets give equal bytes.
  *
  * facts may be NULL. out NULL: computes only the facts.
  *

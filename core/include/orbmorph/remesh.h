@@ -20,7 +20,7 @@ ORB_API const char *orb_remesh_method_name(orb_remesh_method method);
 /* Finds the method of a name, for programs that read it from a command line or a file. Returns 0, and leaves *out
  * unchanged, if there is none. */
 ORB_API int orb_remesh_method_of_name(const char *name, orb_remesh_method *out);
-/* Whether this build has the method; if not, orb_remesh() returns ORB_E_UNSUPPORTED. */
+/* 1 if this build has the method; otherwise 0, and orb_remesh() returns ORB_E_UNSUPPORTED. */
 ORB_API int orb_remesh_available(orb_remesh_method method);
 /* The options that the method uses, as a sum of these bits; it ignores the others, so a user interface can hide them.
  */
@@ -29,11 +29,11 @@ ORB_API unsigned orb_remesh_heeds(orb_remesh_method method);
 
 typedef struct orb_remesh_options {
   orb_remesh_method method; /* adaptive */
-  /* Largest position error, relative to each shape's diagonal; 0.001. Every method that uses it keeps it, up to
+  /* Largest position error, relative to each shape's diagonal; 0.001. A method that uses it stays within it, up to
    * rounding (1e-12), unless max_triangles is too small for that. */
   double tolerance;
   int64_t max_triangles; /* 0: no limit. Takes precedence over the tolerance. */
-  int rims;              /* also make the rims of the first shape's filled holes edges, see orb_supermesh.has_rims; 0 */
+  int rims;              /* 1: the rims of the first shape's filled holes become edges, see has_rims; 0 */
 } orb_remesh_options;
 ORB_API void orb_remesh_defaults(orb_remesh_options *options);
 
@@ -47,9 +47,9 @@ typedef struct orb_supermesh {
   double *error_bound;        /* shape_count: proved bound on the distance, in the shape's units; NaN: none is proved */
   int64_t flipped;            /* on the sphere: 0 */
   int32_t degree;             /* 1 */
-  int has_rims; /* no triangle crosses the rim of a filled hole of the first shape (ORB_MADE_FILL). So it is with
-                   overlay and template; with the others where the options ask for it, max_triangles allows it, and
-                   rounding does */
+  int has_rims; /* 1: no triangle crosses the rim of a filled hole of the first shape (ORB_MADE_FILL). Always 1 with
+                   overlay and template. With other methods, 1 if the options ask for rims, and neither max_triangles
+                   nor rounding prevents it */
 } orb_supermesh;
 
 /* Makes one supermesh for all aligned shapes. The caller passes certified meshes and points. A landmark that the
@@ -57,7 +57,7 @@ typedef struct orb_supermesh {
  * is exactly that corner. overlay, subdivision and convex-hull keep all input vertices; adaptive keeps the landmarks.
  * convex-hull is the baseline of Peng & Timalsena 2016, Fig. 11: the Delaunay triangulation of all vertices, at most 4
  * million; its error is proved but not controlled. options NULL: defaults. Errors: ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED,
- * ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED; template: ORB_E_BAD_LANDMARKS where landmarks turn a triangle over. Stage
+ * ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED; template: ORB_E_BAD_LANDMARKS if landmarks flip a triangle. Stage
  * "remesh". */
 ORB_API ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
                                              int32_t landmark_count, const orb_remesh_options *options,

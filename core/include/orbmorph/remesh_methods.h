@@ -1,6 +1,6 @@
-/* The remesh methods, a row each: the identifier in C, the end of the name of its function in core, the name in
+/* The remesh methods, one row each: the identifier in C, the end of the name of its function in core, the name in
  * requests, options and reports, and the options that it uses (bits of orb_remesh_heeds()). The enumeration
- * orb_remesh_method, the registry in core and the words that requests take are made from this list, in this order.
+ * orb_remesh_method, the registry in core and the words that requests take follow from this list, in this order.
  *
  * Use: #define WORD(id, function, name, heeds) name, … ORB_REMESH_METHODS(WORD) */
 #ifndef ORBMORPH_REMESH_METHODS_H

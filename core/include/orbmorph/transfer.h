@@ -21,8 +21,8 @@ ORB_API void orb_place_before(const orb_mesh *mesh, const orb_aligned_shape *sha
 ORB_API void orb_place_in_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out);
 
 /* How well shape s is reproduced; lengths in its own units. Samples are face centres, edge midpoints and vertices.
- * Without a proved bound all of them count. With one, at most 4096 of each kind on each surface count; they give rms
- * and angles to about 2 %. */
+ * Without a proved bound all of them are measured. With one, at most 4096 of each kind on each surface are; they give
+ * rms and angles to about 2 %. */
 typedef struct orb_shape_report {
   double hausdorff;               /* the supermesh's proved bound, both ways; NaN: none is proved */
   double hausdorff_sampled;       /* both ways, at the samples; apart from rounding, never above the true distance */

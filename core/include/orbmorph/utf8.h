@@ -1,7 +1,7 @@
 /* UTF-8 as RFC 3629 defines it: no overlong forms, no surrogates, nothing above U+10FFFF.
  *
- * Names of shapes and landmarks are UTF-8. An asset gets U+FFFD for each byte that is not; a program that would rather
- * refuse such a name checks it with this function. */
+ * Names of shapes and landmarks are UTF-8. An asset gets U+FFFD for each byte that is not valid. A program that refuses
+ * such names instead can check them with orb_utf8_length(). */
 #ifndef ORBMORPH_UTF8_H
 #define ORBMORPH_UTF8_H
 
@@ -30,8 +30,8 @@ static inline size_t orb_utf8_length(const unsigned char *p, size_t most) {
   return overlong || beyond ? 0 : n;
 }
 
-/* Copies as many whole characters of a text as `size` bytes hold (≥ 1), with NUL at the end. A byte that is no
- * character becomes U+FFFD. Returns the length. */
+/* Copies as many whole characters of a text as `size` bytes hold (≥ 1), with NUL at the end. A byte that is not
+ * part of a character becomes U+FFFD. Returns the length. */
 static inline size_t orb_utf8_copy(char *out, size_t size, const char *text) {
   size_t length = 0;
   for (const unsigned char *p = (const unsigned char *)text; *p;) {

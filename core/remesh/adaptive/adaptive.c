@@ -56,6 +56,8 @@ static const double THIN_OVERLAY = 0.5;
 static const double STRICT_MOST = 0.05;
 /* Relative to the diagonal: no distance on a shape exceeds 1, so more tolerance would not help. */
 static const double TOLERANCE_MOST = 4;
+/* From step to step of the tolerance: smaller steps take longer and end nearer to the least tolerance. */
+static const double RAISE = 1.25;
 
 /* Collapses first, then repairs inverted triangles, while enough vertices are left for that. */
 static orb_status first_round(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target, int strict) {
@@ -208,7 +210,7 @@ static orb_status all_rounds(orb_context *ctx, const orb_remesh_job *job, orb_pl
 /* Raises the tolerance, in steps of a quarter, until at most `most` triangles live. */
 static orb_status reduce_to(orb_context *ctx, orb_placed_net *placed, double tolerance, int64_t most) {
   while (orb_placed_live(placed) > most && tolerance < TOLERANCE_MOST) {
-    tolerance *= 1.25; /* smaller steps take longer and end nearer to the least tolerance */
+    tolerance *= RAISE;
     double limit2 = tolerance * tolerance;
     ORB_TRY(first_round(ctx, placed, limit2, most, tolerance < STRICT_MOST));
     ORB_TRY(second_round(ctx, placed, limit2, most));
@@ -249,7 +251,7 @@ static orb_status remesh_within(orb_context *ctx, const orb_remesh_job *job, dou
 
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
   orb_placed_net placed = {0};
-  double tolerance = job->options->tolerance * (1 - 1e-9) - 1e-12; /* leaves room for the rounding of the bound */
+  double tolerance = orb_remesh_limit(job);
   int64_t most = job->options->max_triangles;
   orb_status status = remesh_within(ctx, job, tolerance, &placed);
   if (status == ORB_OK && most > 0) {

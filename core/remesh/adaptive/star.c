@@ -57,7 +57,7 @@ static int is_among(const int32_t *list, int n, int32_t v) {
   return 0;
 }
 
-/* Finds the sides and the vertices inside; 0 if the triangles are no disc, or it is too large. */
+/* Finds the sides and the vertices inside; 0 if the triangles are not a disc, or it is too large. */
 static int outline(disc *d) {
   const orb_net *net = &d->placed->net;
   int32_t ring[MOST];
@@ -117,7 +117,7 @@ static void replace_sides(disc *d, int i, int removed, const int32_t *put, int c
 }
 
 /* Grows the disc over side i = a→b by the triangle (b, a, c) beyond it. The triangle's other edges become sides, except
- * where one is the neighbouring side: then a or b lies inside. 0 if the result is no disc, or too large. */
+ * where one is the neighbouring side: then a or b lies inside. 0 if the result is not a disc, or too large. */
 static int grow_over(disc *d, int i) {
   const orb_net *net = &d->placed->net;
   int32_t g = net->twin[d->side[i].h], put[2];

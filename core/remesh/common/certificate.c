@@ -18,6 +18,9 @@ typedef struct orientation_count {
 
 enum { GRAIN = 4096 };    /* triangles a thread takes at a time */
 enum { DIRECTIONS = 16 }; /* tried until one lies on no edge */
+/* The first direction, and the difference between two. Their digits have no meaning: a mesh is unlikely to have edges
+ * there. */
+static const double FIRST[3] = {0.5377, -0.3119, 0.7833}, STEP[3] = {0.0131, 0.0373, -0.0577};
 
 static const double *corner(const orb_supermesh *mesh, int64_t h) {
   return mesh->points + 3 * (int64_t)mesh->triangles[h];
@@ -60,7 +63,7 @@ static int32_t cover(const orb_supermesh *mesh, const double q[3]) {
 
 static int32_t degree_of(const orb_supermesh *mesh) {
   for (int i = 0; i < DIRECTIONS; i++) {
-    const double q[3] = {0.5377 + 0.0131 * i, -0.3119 + 0.0373 * i, 0.7833 - 0.0577 * i};
+    const double q[3] = {FIRST[0] + STEP[0] * i, FIRST[1] + STEP[1] * i, FIRST[2] + STEP[2] * i};
     int32_t count = cover(mesh, q);
     if (count >= 0) {
       return count;

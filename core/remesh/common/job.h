@@ -4,6 +4,10 @@
 
 #include "orbmorph/remesh.h"
 
+/* What proofs of distance leave for the rounding of a bound: relative to the tolerance, and relative to the diagonal.
+ */
+static const double ORB_REMESH_ROUNDING = 1e-9, ORB_REMESH_ROUNDING_LEAST = 1e-12;
+
 typedef struct orb_remesh_job {
   const orb_aligned_shape *shapes;
   int32_t shape_count;
@@ -13,6 +17,11 @@ typedef struct orb_remesh_job {
   orb_locator **locator; /* per shape */
   double *diagonal;      /* per shape: of its bounding box */
 } orb_remesh_job;
+
+/* The distance, relative to the diagonal, within which a method proves a result to lie. */
+static inline double orb_remesh_limit(const orb_remesh_job *job) {
+  return job->options->tolerance * (1 - ORB_REMESH_ROUNDING) - ORB_REMESH_ROUNDING_LEAST;
+}
 
 /* A method fills triangles, points, places and error bounds of `out`, whose error_bound holds shape_count NaN.
  * orb_remesh() finds the landmarks and certifies the result. */

@@ -17,6 +17,12 @@
 #include "remesh/overlay/snap.h"
 #include "remesh/overlay/trace.h"
 
+/* Every triangle lies in one triangle of each shape, so only places and their positions are rounded: by a few units in
+ * the last place of the largest coordinate, for each shape of the overlay. */
+static const double PLACE_ROUNDING = 64 * 2.3e-16;
+/* Of the diagonal: what rounding adds when a caller measures the distance. */
+static const double DISTANCE_ROUNDING = 1e-13;
+
 /* The overlay of the first shapes: one triangulation, with places and parents on each of them. */
 typedef struct partial {
   int32_t vertex_count, triangle_count, shapes;
@@ -61,7 +67,7 @@ static void overlay_free(orb_context *ctx, orb_overlay *overlay) {
 }
 
 /* Adds weight times a place's coordinates, expressed in the corners of triangle `in`. Returns 0 if a corner of the
- * place with weight is no corner of that triangle. */
+ * place with weight is not a corner of that triangle. */
 static int express(const int32_t *triangles, const orb_place *place, int32_t in, double weight, double at[3]) {
   for (int k = 0; k < 3; k++) {
     if (place->at[k] > 0) {
@@ -278,11 +284,8 @@ orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_s
   }
   for (int32_t s = 0; s < job->shape_count; s++) {
     memcpy(out->places + (int64_t)s * now.vertex_count, now.places[s], (size_t)now.vertex_count * sizeof(orb_place));
-    /* Every triangle lies in one triangle of the shape; only places and their positions are rounded, by a few units in
-     * the last place for each shape of the overlay. The term with the diagonal covers rounding when a caller measures
-     * the distance. */
-    out->error_bound[s] = now.moved[s] + 64 * 2.3e-16 * job->shape_count * largest_coordinate(&job->shapes[s].mesh) +
-                          1e-13 * job->diagonal[s];
+    out->error_bound[s] = now.moved[s] + PLACE_ROUNDING * job->shape_count * largest_coordinate(&job->shapes[s].mesh) +
+                          DISTANCE_ROUNDING * job->diagonal[s];
   }
   out->vertex_count = now.vertex_count;
   out->triangle_count = now.triangle_count;

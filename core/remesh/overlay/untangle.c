@@ -18,6 +18,9 @@ enum { STEPS = 46 };  /* halvings of the way to the middle: down to 2⁻⁴⁵, 
  * flipped triangles move too. Smaller numbers cost more time. */
 enum { ALL_EVERY = 20, WIDE_EVERY = 4 };
 
+/* Height that stands for one that rounding gave the wrong sign: below every one that is computed right. */
+static const double FLAT = 1e-18;
+
 typedef struct untangler {
   double *points;
   const int32_t *triangles;
@@ -44,9 +47,9 @@ static double worst_at(const untangler *k, int32_t v, const double p[3]) {
     double length = sqrt(orb_distance2(a, b)), height = length > 0 ? orb_det(p, a, b) / length : 0;
     int sign = orb_orient(p, a, b);
     if (sign <= 0 && height >= 0) {
-      height = -1e-18;
+      height = -FLAT;
     } else if (sign > 0 && height <= 0) {
-      height = 1e-18;
+      height = FLAT;
     }
     worst = height < worst ? height : worst;
   }

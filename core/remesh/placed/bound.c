@@ -75,6 +75,8 @@ double orb_placed_item2(const orb_placed_net *placed, int32_t item, int32_t a, i
                              orb_placed_position(placed, b, s), orb_placed_position(placed, c, s));
 }
 
+/* Rounding of the places, relative to the distance, and of the distances, relative to the diagonal. */
+static const double PLACE_ROUNDING = 1e-12, DISTANCE_ROUNDING = 1e-13;
 enum { GRAIN = 512 }; /* triangles a thread takes at a time */
 
 typedef struct bound_loop {
@@ -117,8 +119,7 @@ orb_status orb_placed_bounds(orb_context *ctx, const orb_placed_net *placed, dou
     for (int64_t i = 0; i < chunks; i++) {
       greatest = fmax(greatest, loop.greatest[i * placed->shape_count + s]);
     }
-    /* the two terms cover rounding of the places and of the distances */
-    bound[s] = placed->job->diagonal[s] * (sqrt(greatest) * (1 + 1e-12) + 1e-13);
+    bound[s] = placed->job->diagonal[s] * (sqrt(greatest) * (1 + PLACE_ROUNDING) + DISTANCE_ROUNDING);
   }
   orb_free(ctx, loop.greatest);
   return orb_context_check(ctx);

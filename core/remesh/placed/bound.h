@@ -6,7 +6,7 @@
  * shape to the two nearest points of these two segments. Each cell of the overlay lies in one triangle of the shape and
  * in one of the net, so its linear extension stays in both (they are convex); both maps are continuous and of degree 1,
  * so they cover both surfaces; and the distance of matched points is greatest at vertices. The greatest of the matched
- * distances therefore bounds the Hausdorff (even the Fréchet) distance, both ways. The bound depends on nothing but the
+ * distances therefore bounds the Hausdorff (even the Fréchet) distance, both ways. The bound depends only on the
  * combinatorics of the overlay, which exact predicates decide, so it suffices to store which vertices lie in which
  * triangle.
  *

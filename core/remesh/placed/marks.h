@@ -1,5 +1,5 @@
 /* Marks: 64-bit digests of what a search depends on. A search that found nothing keeps its mark and is skipped while
- * the mark stays the same. Two states with equal marks, by a chance of about 2⁻⁶⁴, cost a search that is left out; they
+ * the mark stays the same. If two states have equal marks (probability about 2⁻⁶⁴), one search is skipped wrongly. That
  * cannot falsify a bound, because orb_placed_bounds() uses no marks. */
 #ifndef ORB_REMESH_PLACED_MARKS_H
 #define ORB_REMESH_PLACED_MARKS_H

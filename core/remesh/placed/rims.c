@@ -181,7 +181,7 @@ static orb_status trace_all(rims *r) {
 
 static int is_within(const orb_remesh_job *job, const double *bound) {
   for (int32_t s = 0; s < job->shape_count; s++) {
-    if (!(bound[s] <= job->options->tolerance * job->diagonal[s] * (1 + 1e-9))) {
+    if (!(bound[s] <= job->options->tolerance * job->diagonal[s] * (1 + ORB_REMESH_ROUNDING))) {
       return 0;
     }
   }
@@ -224,7 +224,7 @@ static orb_status split_once(rims *r, orb_placed_net *placed, double limit2, int
 /* Computes the places of the net. Where the supermesh was within the tolerance, edges are split until the net is, too;
  * failed if that does not end. */
 static orb_status place(rims *r, int keeps_tolerance, double *bound, orb_placed_net *placed) {
-  const double limit = r->job->options->tolerance * (1 - 1e-9) - 1e-12; /* leaves room for the rounding of the bound */
+  const double limit = orb_remesh_limit(r->job);
   int64_t changes = keeps_tolerance;
   ORB_TRY(orb_placed_create_on(r->ctx, r->job, &r->net, placed));
   for (int round = 0; round < ROUNDS && changes > 0; round++) {

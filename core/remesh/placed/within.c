@@ -2,6 +2,7 @@
  * the same filter; where that fails, or the arc meets a vertex, the exact tracer takes over. */
 #include <math.h>
 
+#include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "remesh/placed/bound.h"
 #include "remesh/placed/distance.h"
@@ -59,7 +60,7 @@ static inline double side_of(const orb_arc_tracer *t, const orb_pack_vertex *v) 
   double u[3];
   orb_sub(v->point, t->p, u);
   double d = orb_dot(t->normal, u);
-  return fabs(d) > 1e-15 * t->size * (fabs(u[0]) + fabs(u[1]) + fabs(u[2])) + 1e-220 ? d : NAN;
+  return fabs(d) > ORB_ORIENT_RELATIVE * t->size * (fabs(u[0]) + fabs(u[1]) + fabs(u[2])) + ORB_ORIENT_LEAST ? d : NAN;
 }
 
 static inline int ends_in(const orb_arc_tracer *t, int32_t triangle) {

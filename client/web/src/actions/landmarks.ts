@@ -95,7 +95,7 @@ export function forgetShape(key: string) {
 
 type Listed = Pick<WireLandmark, 'name' | 'at'>[];
 
-/** The landmarks of a file or a response on the shapes; those that fit no shape are left out. */
+/** The landmarks of a file or a response on the shapes; those that fit no shape are omitted. */
 async function located(list: Listed, snap: boolean): Promise<Landmark[]> {
   const shapes = readyShapes();
   const made: Landmark[] = list.map((l) => ({ id: ++count, name: l.name ?? '', at: {} }));

@@ -259,7 +259,7 @@ export function cancelMerge() {
 /**
  * Shows a morph. `keep`: in place of the shown one, with its time, mixture and view. `signal`: if aborted meanwhile,
  * nothing changes. `matches`: those among which it is one; by default those that its answer lists. `look`: of its
- * materials, see MorphData. `extras`: the weights of its targets that are no shapes; by default those of the asset.
+ * materials, see MorphData. `extras`: the weights of its targets that are not shapes; by default those of the asset.
  */
 export async function openResult(
   supermesh: Supermesh,

@@ -232,7 +232,7 @@ export async function decodeImages(skin: Skin | undefined) {
   skin.files = [];
 }
 
-/** Frees the decoded images of a skin that nothing draws any more. */
+/** Frees the decoded images of a skin that is no longer drawn. */
 export function closeImages(skin: Skin | null | undefined) {
   for (const image of skin?.images ?? []) image?.close();
 }

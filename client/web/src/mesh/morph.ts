@@ -9,7 +9,7 @@ export interface Look {
   variant: number;
 }
 
-/** A target that is no shape: it came with a file. */
+/** A target that is not a shape: it came with a file. */
 export interface Extra {
   name: string;
   /** among the targets of MorphData */

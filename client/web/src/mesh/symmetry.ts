@@ -16,7 +16,7 @@ const SAMPLES = 400;
 const ROUNDS = 12;
 /** A plane counts if mirrored points are that near the surface: root mean square, in half diagonals of the box. */
 const GOOD = 0.012;
-/** Another plane, turned by more than 15°, has to be that much worse. A ball or a box has many good planes. */
+/** Another plane, rotated by more than 15°, has to be that much worse. A ball or a box has many good planes. */
 const CLEARLY = 4;
 const SAME = Math.cos((15 * Math.PI) / 180);
 

@@ -11,7 +11,7 @@ export interface Settings {
   loop: string;
   /** of the materials; -1: those of the primitives */
   variant: number;
-  /** weights of targets of the primitives that are no shapes */
+  /** weights of targets of the primitives that are not shapes */
   extras: { target: number; weight: number }[];
   camera: Record<'yaw' | 'pitch' | 'distance' | 'panX' | 'panY', number>;
 }

@@ -188,7 +188,7 @@ function toScene(m, read) {
 }
 
 /**
- * The keys of the path from the first to the last shape: {time, target}; target −1 is the base. Rests are left out, and
+ * The keys of the path from the first to the last shape: {time, target}; target −1 is the base. Rests are omitted, and
  * the shapes stand at equal intervals.
  */
 function pathOf({ json, read }, first, targets, shapes) {
@@ -394,7 +394,7 @@ function frameOf(primitives, shapes) {
 /**
  * Opens a morph on a canvas. settings: shapes (their number), tints (colours of shapes without material), seconds a
  * shape, easing, loop ("pingpong" or "loop"), variant of the materials (-1: those of the primitives), extras (targets of
- * the primitives that are no shapes, with weights), and the camera: yaw, pitch, distance, panX, panY.
+ * the primitives that are not shapes, with weights), and the camera: yaw, pitch, distance, panX, panY.
  */
 export async function open(canvas, glb, settings) {
   const gl = canvas.getContext('webgl2', { antialias: true, alpha: true, preserveDrawingBuffer: true });

@@ -69,7 +69,7 @@ export function Match({ result }: { result: Result }) {
         )}
         {supermesh.match && supermesh.match.verdict !== 'sure' && state.show !== 'stretch' && (
           <Button
-            title="Where the morph stretches the surface, and the map is least to be trusted"
+            title="Where the morph stretches the surface and the map is least reliable"
             onClick={() => {
               player.pause();
               set({ show: 'stretch' });
@@ -100,18 +100,18 @@ export function Suspects({ result: { supermesh } }: { result: Result }) {
   );
 }
 
-/** Beyond this a fit turned a shape over: degrees of its up axis. */
+/** Degrees of the up axis beyond which a fit laid a shape down or stood it on its head. */
 const OVER = 60;
 
-/** What the fit did to shapes that it turned over. */
-export function Turned({ result: { supermesh } }: { result: Result }) {
+/** What the fit did to shapes whose up axis it rotated far. */
+export function Rotated({ result: { supermesh } }: { result: Result }) {
   const over = supermesh.shapes.filter(({ fit }) => (fit?.up_degrees ?? 0) > OVER);
   if (!over.length) return null;
   return (
-    <ul class="hint" aria-label="Shapes that the fit turned over">
+    <ul class="hint" aria-label="Shapes that the fit rotated">
       {over.map(({ name, fit }) => (
         <li key={name}>
-          {`The fit turned ${name} over: its up axis by ${Math.round(fit!.up_degrees)}°. If that is wrong, set landmarks, or choose another fit under Options.`}
+          {`The fit rotated the up axis of ${name} by ${Math.round(fit!.up_degrees)}°. If that is wrong, set landmarks, or choose another fit under Options.`}
         </li>
       ))}
     </ul>

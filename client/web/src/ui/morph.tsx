@@ -8,7 +8,7 @@ import { player } from '../player';
 import { client } from '../state';
 import { Beside } from './beside';
 import { Legend, Name } from './labels';
-import { Coarse, Match, Suspects, Turned, Warnings } from './match';
+import { Coarse, Match, Suspects, Rotated, Warnings } from './match';
 import { Button, count, Icon, relative, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';
@@ -225,7 +225,7 @@ export function MorphInspector() {
       <h2>Morph</h2>
       <Shown result={result} />
       <Match result={result} />
-      <Turned result={result} />
+      <Rotated result={result} />
       <Suspects result={result} />
       <Warnings result={result} />
       <Coarse result={result} />
@@ -378,8 +378,8 @@ function StretchLoader() {
   useEffect(() => void measureStretch(), [state.result]);
   return (
     <p class="hint">
-      The map is least to be trusted where it stretches most: the symmetric Dirichlet energy between the first shape and
-      each other one, from 1 to bad.
+      The map is least reliable where it stretches most: the symmetric Dirichlet energy between the first shape and each
+      other one, from 1 to bad.
     </p>
   );
 }
@@ -428,7 +428,7 @@ function Mix({ result }: { result: Result }) {
   );
 }
 
-/** A slider for each target that is no shape: those that came with the files. */
+/** A slider for each target that is not a shape: those that came with the files. */
 function Extras({ result }: { result: Result }) {
   const { extras } = result.data;
   if (!extras.length) return null;

@@ -152,7 +152,9 @@ function Extras() {
           <span>{TAKE[what](shape.name)}</span>
         </label>
       ))}
-      <p class="hint">The morph shows it on its own surface: each vertex gets what the shape has at the same place.</p>
+      <p class="hint">
+        The morph gets these on its own surface: each vertex takes the values at its place on the shape.
+      </p>
     </fieldset>
   );
 }

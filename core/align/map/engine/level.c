@@ -10,6 +10,8 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
+/* Of the mean edge: added to the mean edge of each triangle, so that the slack of a point is above 0. */
+static const double MEAN_SHARE = 1e-3;
 enum { LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 }; /* vertices between checks for cancellation, and of one task */
 
 void orb_map_level_free(orb_context *ctx, orb_map_level *l) {
@@ -65,7 +67,7 @@ static void shape_of(const double length[3], double slack, double cot[3], double
     l[k] = length[k] + (least < slack ? slack - least : 0);
   }
   double s = 0.5 * (l[0] + l[1] + l[2]), a2 = s * (s - l[0]) * (s - l[1]) * (s - l[2]);
-  *area = sqrt(a2 > 0 ? a2 : 0) + 1e-300;
+  *area = sqrt(a2 > 0 ? a2 : 0) + ORB_TINY;
   for (int k = 0; k < 3; k++) {
     double b = l[(k + 1) % 3], c = l[(k + 2) % 3];
     cot[k] = (b * b + c * c - l[k] * l[k]) / (4 * *area);
@@ -94,7 +96,7 @@ static void fill_triangles(orb_map_level *l, const double *position, double *sha
         mean += sum / (3.0 * l->triangle_count);
       } else {
         double *out = shape + 4 * (size_t)t;
-        shape_of(length, l->params->star.mollify * (sum / 3 + 1e-3 * mean), out, out + 3);
+        shape_of(length, l->params->star.mollify * (sum / 3 + MEAN_SHARE * mean), out, out + 3);
         total += out[3];
       }
     }
@@ -294,7 +296,7 @@ static double triangle_energy(const orb_map_level *l, int32_t v, const orb_map_s
     normal[k] =
         l->n[3 * (size_t)v + (size_t)k] + l->n[3 * (size_t)s->q + (size_t)k] + l->n[3 * (size_t)s->r + (size_t)k];
   }
-  double signed_area = 0.5 * orb_dot(cross, normal) / (orb_length(normal) + 1e-300);
+  double signed_area = 0.5 * orb_dot(cross, normal) / (orb_length(normal) + ORB_TINY);
   double dirichlet = 0.5 * (s->cv * orb_distance2(q, r) + s->cq * orb_dot(w, w) + s->cr * orb_dot(u, u));
   double ratio = signed_area > 0 ? s->area / signed_area : INFINITY;
   return dirichlet * (1 + ratio * ratio) / (4 * s->area);

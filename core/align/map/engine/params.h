@@ -271,8 +271,8 @@ typedef struct orb_map_params {
     double rigid_cap;       /* of a squared distance, so that parts without a counterpart do not decide */
     int32_t fixed_search;   /* vertices of the fixed shape beyond which only every second, third, … is searched */
     double normal_weight;   /* of |n − n'|² against |x − x'|² */
-    double facing;          /* least cosine of normals; a control with less is left out of the round */
-    double far;             /* mean distances beyond which a control is left out */
+    double facing;          /* least cosine of normals; a control with less is omitted from the round */
+    double far;             /* mean distances beyond which a control is omitted */
     int32_t least_controls; /* that must be left, or the spline stays as it is */
     double slide;           /* most that a target slides from a vertex within its tangent plane */
   } registration;

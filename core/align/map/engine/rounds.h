@@ -4,7 +4,7 @@
 
 #include "align/map/engine/run.h"
 
-/* Sweeps until hardly a vertex moves any more, `count` times at most. */
+/* Sweeps until hardly any vertex moves, `count` times at most. */
 ORB_MUST_CHECK orb_status orb_map_sweeps(orb_map_run *run, orb_map_level *level, orb_map_rules rules, int count);
 
 /* Rules of sweeps that allow no flip. */

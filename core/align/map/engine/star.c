@@ -3,8 +3,8 @@
  * A triangle of the moving shape with area a has three places on the fixed shape, and its image is the flat triangle of
  * their positions: D = ½ Σ cot·|edge|² is its Dirichlet energy and s its area, signed along the fixed shape's
  * interpolated normals (unsigned areas would lock triangles inverted). E = D (1 + a²/χ(s)²) is the symmetric Dirichlet
- * energy with χ(s) = ½(s + √(s² + ε²)), the usual regularised positive part, with which an inverted triangle can turn
- * right side out. On the sphere a hinge barrier acts on every determinant below a share (params.star.hinge) of what the
+ * energy with χ(s) = ½(s + √(s² + ε²)), the usual regularised positive part, which lets an inverted triangle become
+ * positive. On the sphere a hinge barrier acts on every determinant below a share (params.star.hinge) of what the
  * areas would give.
  *
  * Most stars have about six triangles: the loops run over eight lanes at once, and only the sums go one by one.
@@ -55,7 +55,7 @@ ORB_CLONES static void derive(orb_map_lanes *l, const double *x, double hinge) {
     l->plane[1][i] = p1;
     l->plane[2][i] = p2;
     l->det[i] = p0 * x0 + p1 * x1 + p2 * x2;
-    l->hinge[i] = 1 / (hinge * 2 * l->area[i] * l->density[i] + 1e-300);
+    l->hinge[i] = 1 / (hinge * 2 * l->area[i] * l->density[i] + ORB_TINY);
   }
 }
 
@@ -148,7 +148,8 @@ ORB_CLONES static void stretch(orb_map_lanes *restrict l, const double *frame, d
     double d2 = cq * (z0 * b0 + z1 * b1 + z2 * b2) + cr * (u0 * b0 + u1 * b1 + u2 * b2);
     double dd = cq + cr, half = 0.5 * d < area ? 0.5 * d : area;
     double e = epsilon * (half + flat * area), root = sqrt(s * s + e * e);
-    double positive = 0.5 * (s + root), negative = 0.5 * e * e / (root - s) + 1e-300, c = s >= 0 ? positive : negative;
+    double positive = 0.5 * (s + root), negative = 0.5 * e * e / (root - s) + ORB_TINY,
+           c = s >= 0 ? positive : negative;
     double c1 = c / root, c2 = 0.5 * e * e / (root * root * root), h = area / c;
     h *= h;
     double f = 1 + h, fp = -2 * h * c1 / c, curvature = 6 * h * c1 * c1 / (c * c) - 2 * h * c2 / c;
@@ -218,7 +219,7 @@ ORB_CLONES static void energies(const orb_map_lanes *l, const double *y, double 
     double d = 0.5 * (l->cv[i] * l->qr2[i] + l->cq[i] * (z0 * z0 + z1 * z1 + z2 * z2) +
                       l->cr[i] * (u0 * u0 + u1 * u1 + u2 * u2));
     double s = 0.5 * (l->grow[0][i] * u0 + l->grow[1][i] * u1 + l->grow[2][i] * u2), e = l->epsilon[i];
-    double root = sqrt(s * s + e * e), positive = 0.5 * (s + root), negative = 0.5 * e * e / (root - s) + 1e-300;
+    double root = sqrt(s * s + e * e), positive = 0.5 * (s + root), negative = 0.5 * e * e / (root - s) + ORB_TINY;
     double h = l->area[i] / (s >= 0 ? positive : negative);
     energy[i] = d * (1 + h * h);
   }

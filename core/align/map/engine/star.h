@@ -35,7 +35,7 @@ typedef struct orb_map_newton {
 void orb_map_star_load(orb_map_star *star, const orb_map_level *level, int32_t v);
 
 /* Energy, gradient and Hessian in the tangents e1, e2. j1 and j2 are the derivatives of the point on the sphere; where
- * j1 is NULL, the derivatives leave out the barrier. Sets the lanes' ε. */
+ * j1 is NULL, the derivatives omit the barrier. Sets the lanes' ε. */
 void orb_map_star_system(orb_map_star *star, const orb_map_rules *rules, const double y[3], const double *e1,
                          const double *e2, const double *j1, const double *j2, orb_map_newton *out);
 

@@ -22,12 +22,12 @@ static void sphere_jacobian(const orb_map_surface *b, const orb_place *place, co
   orb_sub(q, p, u);
   orb_sub(r, p, w);
   double u1 = orb_dot(u, e1), u2 = orb_dot(u, e2), w1 = orb_dot(w, e1), w2 = orb_dot(w, e2);
-  double det = u1 * w2 - u2 * w1, inverse = fabs(det) > 1e-300 ? 1 / det : 0;
+  double det = u1 * w2 - u2 * w1, inverse = fabs(det) > ORB_TINY ? 1 / det : 0;
   for (int k = 0; k < 3; k++) {
     at[k] = place->at[0] * b->s[3 * (size_t)v[0] + (size_t)k] + place->at[1] * b->s[3 * (size_t)v[1] + (size_t)k] +
             place->at[2] * b->s[3 * (size_t)v[2] + (size_t)k];
   }
-  double scale = inverse / (orb_length(at) + 1e-300);
+  double scale = inverse / (orb_length(at) + ORB_TINY);
   for (int k = 0; k < 3; k++) {
     double du = b->s[3 * (size_t)v[1] + (size_t)k] - b->s[3 * (size_t)v[0] + (size_t)k];
     double dw = b->s[3 * (size_t)v[2] + (size_t)k] - b->s[3 * (size_t)v[0] + (size_t)k];

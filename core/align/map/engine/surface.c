@@ -8,6 +8,10 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
+static const double NO_WIDTH = 1e-12;   /* a triangle whose apex is this near to the line of its base has no normal */
+static const double NOT_PARALLEL = 0.6; /* cosine: an axis at a greater angle is far from parallel to an edge */
+static const double LEAST_TWICE_AREA = 1e-12; /* added to an area that is divided by; shapes have area 4π */
+
 void orb_map_surface_free(orb_context *ctx, orb_map_surface *b) {
   orb_locator_destroy(ctx, b->locator);
   orb_free(ctx, b->x);
@@ -52,8 +56,8 @@ static void make_frame(const double *p, const double *q, const double *r, double
   for (int k = 0; k < 3; k++) {
     f[k] -= along * e[k];
   }
-  if (!(orb_normalize(f) > 1e-12)) {
-    const double axis[3] = {fabs(e[0]) < 0.6, fabs(e[0]) >= 0.6, 0};
+  if (!(orb_normalize(f) > NO_WIDTH)) {
+    const double axis[3] = {fabs(e[0]) < NOT_PARALLEL, fabs(e[0]) >= NOT_PARALLEL, 0};
     orb_cross(e, axis, f);
     orb_normalize(f);
   }
@@ -93,8 +97,8 @@ orb_status orb_map_surface_create(orb_context *ctx, const orb_aligned_shape *sha
     orb_sub(q, p, u);
     orb_sub(r, p, w);
     orb_cross(u, w, n);
-    b.density[t] =
-        orb_det(b.s + 3 * (size_t)v[0], b.s + 3 * (size_t)v[1], b.s + 3 * (size_t)v[2]) / (orb_length(n) + 1e-12);
+    b.density[t] = orb_det(b.s + 3 * (size_t)v[0], b.s + 3 * (size_t)v[1], b.s + 3 * (size_t)v[2]) /
+                   (orb_length(n) + LEAST_TWICE_AREA);
   }
   ORB_GO(status, orb_locator_create(ctx, b.s, b.vertex_count, b.triangles, b.triangle_count, b.twin, &b.locator), fail);
   *out = b;

@@ -441,8 +441,9 @@ orb_status orb_map_level_set_anew(orb_context *ctx, orb_map_level *l, const unsi
     for (int32_t v = 0; v < l->count; v++) {
       any |= mark[v] && try_vertex(&u, v, THIN);
     }
-    u.queue_count = 0;
-    memset(u.queued, 0, (size_t)l->count);
+    while (u.queue_count > 0) {
+      u.queued[u.queue[--u.queue_count]] = 0;
+    }
   }
   ORB_GO(status, bring_back(&u, &all), done);
   if (!all) {

@@ -19,10 +19,14 @@
 #include "numeric/vec3.h"
 
 enum { FLIP_GRAIN = 1024, CHECK_EVERY = 4096 }; /* triangles of one task; vertices between checks for cancellation */
+enum { RING_ROUNDS = 4 };                       /* rounds after which one more ring around the flips may move */
+enum { SHARED_ROUNDS = 3 };                     /* of so many rounds with many flips, one has an ε for each star */
+static const double LEAST_EPSILON = 1e-100;     /* keeps ε above 0 in a star whose triangles are all points */
+static const double LONGEST_STEP = 0.5; /* radians, about: the energy of a longer one is not that of the plane */
 
 static double chi(double d, double e) {
   double root = sqrt(d * d + e * e);
-  return d >= 0 ? 0.5 * (d + root) : 0.5 * e * e / (root - d) + 1e-300;
+  return d >= 0 ? 0.5 * (d + root) : 0.5 * e * e / (root - d) + ORB_TINY;
 }
 
 static const double *point(const orb_map_level *l, int32_t v) {
@@ -49,7 +53,7 @@ static double star_epsilon(const orb_map_level *l, int32_t v) {
   }
   const orb_map_params *params = l->params;
   return params->untangle.star_mean * sum / (l->start[v + 1] - l->start[v]) - params->untangle.star_worst * worst +
-         1e-100;
+         LEAST_EPSILON;
 }
 
 /* One step of v; the point only changes where the energy falls. */
@@ -86,7 +90,7 @@ static void step(orb_map_level *l, int32_t v, double least_epsilon) {
   if (!(det > 0) || !(length > 0)) {
     return;
   }
-  double most = fmin(0.5, sqrt(longest)), scale = length > most ? most / length : 1;
+  double most = fmin(LONGEST_STEP, sqrt(longest)), scale = length > most ? most / length : 1;
   for (int tries = 0; tries < l->params->untangle.tries; tries++, scale *= l->params->untangle.shorten) {
     double moved[3];
     for (int k = 0; k < 3; k++) {
@@ -269,12 +273,12 @@ orb_status orb_map_level_untangle(orb_context *ctx, orb_map_level *l, int32_t *l
     if (*left == 0 || round == params->untangle.rounds || stale > params->untangle.stale) {
       break;
     }
-    int rings = 1 + round / 4;
+    int rings = 1 + round / RING_ROUNDS;
     orb_map_level_grow_marks(l, rings < params->untangle.rings_most ? rings : params->untangle.rings_most, mark, next);
     /* Many flips need one ε for all; the last few hide in stars that are far smaller. */
     double scale = 1.0 / l->triangle_count;
     is.least_epsilon =
-        *left > params->untangle.few && round % 3
+        *left > params->untangle.few && round % SHARED_ROUNDS
             ? sqrt(params->untangle.all_mean2 * scale * scale + params->untangle.all_worst2 * worst * worst)
             : 0;
     join_islands(&is, mark);

@@ -55,7 +55,7 @@ static void least_axis(const double a[9], double out[3]) {
     norm += a[i] * a[i];
   }
   for (int i = 0; i < 9; i++) {
-    shifted[i] = a[i] + (i % 4 == 0 ? sqrt(norm) + 1e-300 : 0);
+    shifted[i] = a[i] + (i % 4 == 0 ? sqrt(norm) + ORB_TINY : 0);
   }
   orb_svd3(shifted, u, s, v);
   for (int k = 0; k < 3; k++) {

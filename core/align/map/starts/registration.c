@@ -204,7 +204,7 @@ static void load_anchors(targets_run *run) {
   }
 }
 
-/* One round with the first `controls` controls; leaves out those that face away or lie far off. */
+/* One round with the first `controls` controls; omits those that face away or lie far off. */
 static orb_status icp_round(targets_run *run, int32_t controls, double stiffness, double *fit) {
   orb_parallel_for(run->ctx, controls, 8, find_targets, run);
   ORB_TRY(orb_context_check(run->ctx));

@@ -68,7 +68,7 @@ static void weigh(const smoothing *s) {
   const double outlier = s->params->smooth.outlier;
   for (int32_t v = 0; v < l->count; v++) {
     const double far2 = orb_distance2(l->x + 3 * (size_t)v, s->target + 3 * (size_t)v);
-    const double scale2 = fmax(l->density[v], 1e-300); /* not 0 where the fixed shape has a flat triangle */
+    const double scale2 = fmax(l->density[v], ORB_TINY); /* not 0 where the fixed shape has a flat triangle */
     const double share = 1 / (1 + far2 / (scale2 * outlier * outlier));
     s->trust[v] = share * share * s->smooth[v];
   }

@@ -16,7 +16,8 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-enum { CHECK_EVERY = 64 }; /* steps between checks for cancellation */
+enum { CHECK_EVERY = 64 };         /* steps between checks for cancellation */
+static const double MARGIN = 1e-9; /* of the heights of a triangle: a ring this far from a corner crosses two edges */
 
 typedef struct link_of {
   int32_t a, b;
@@ -29,7 +30,7 @@ static double cotangent(const orb_map_surface *s, int32_t h) {
   orb_sub(s->x + 3 * (size_t)s->triangles[h], o, u);
   orb_sub(s->x + 3 * (size_t)s->triangles[orb_next(h)], o, w);
   orb_cross(u, w, n);
-  return orb_dot(u, w) / (orb_length(n) + 1e-300);
+  return orb_dot(u, w) / (orb_length(n) + ORB_TINY);
 }
 
 /* The vertices inside except the pole, numbered from 2 on; 0 represents all vertices outside, 1 the pole. */
@@ -184,7 +185,7 @@ static double slope(const orb_map_surface *b, const double *height, int32_t t) {
   for (int k = 0; k < 3; k++) {
     d[k] = dw * u[k] - du * w[k];
   }
-  return orb_length(d) / (orb_length(n) + 1e-300);
+  return orb_length(d) / (orb_length(n) + ORB_TINY);
 }
 
 /* The flux across a ring within triangle t, from one crossing to the next. */
@@ -212,7 +213,7 @@ static double level_of(const orb_map_surface *b, const double *height, const orb
     low = fmin(low, height[v[k]]);
     high = fmax(high, height[v[k]]);
   }
-  double margin = 1e-9 * (high - low);
+  double margin = MARGIN * (high - low);
   return fmin(fmax(level, low + margin), high - margin);
 }
 

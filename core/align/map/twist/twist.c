@@ -20,6 +20,9 @@
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
+static const double GROWTH_VERTICES = 1e4; /* vertices of a surface for which params.twist.growth counts rings */
+static const double NOT_PARALLEL = 0.7;    /* cosine: an axis at a greater angle is far from parallel to the limb's */
+
 typedef struct twist_run {
   orb_context *ctx;
   const orb_map_params *params;
@@ -72,11 +75,7 @@ static double share_inside(const twist_run *run) {
   for (int32_t t = 0; t < b->triangle_count; t++) {
     const int32_t *v = b->triangles + 3 * (size_t)t;
     if (run->inside[v[0]] && run->inside[v[1]] && run->inside[v[2]]) {
-      double u[3], w[3], n[3];
-      orb_sub(b->x + 3 * (size_t)v[1], b->x + 3 * (size_t)v[0], u);
-      orb_sub(b->x + 3 * (size_t)v[2], b->x + 3 * (size_t)v[0], w);
-      orb_cross(u, w, n);
-      area += 0.5 * orb_length(n);
+      area += orb_triangle_area(b->x + 3 * (size_t)v[0], b->x + 3 * (size_t)v[1], b->x + 3 * (size_t)v[2]);
     }
   }
   return area / (4 * M_PI);
@@ -160,7 +159,7 @@ static double dilate(twist_run *run, int *blocked) {
 static orb_status grow(twist_run *run) {
   const orb_map_surface *b = run->b;
   double narrowest = INFINITY;
-  int rings = (int)(run->params->twist.growth * sqrt(fmax(1, b->vertex_count / 1e4)));
+  int rings = (int)(run->params->twist.growth * sqrt(fmax(1, b->vertex_count / GROWTH_VERTICES)));
   find_rim(run);
   for (int i = 0; i < rings && run->rim_count > 0; i++) {
     int blocked;
@@ -246,7 +245,7 @@ static double rotation_between(const band *low, const band *high) {
   if (!(orb_normalize(axis) > 0)) {
     return 0;
   }
-  orb_cross(axis, fabs(axis[0]) < 0.7 ? any : other, e);
+  orb_cross(axis, fabs(axis[0]) < NOT_PARALLEL ? any : other, e);
   orb_normalize(e);
   orb_cross(axis, e, f);
   for (int k = 0; k < 9; k++) {

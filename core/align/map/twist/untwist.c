@@ -123,7 +123,7 @@ static orb_status untwist_all(untwisting *u, const orb_corner_table *s, int step
   return ORB_OK;
 }
 
-/* Untwists one limb after the other, and leaves out those that fold. *flips: 0 if any limb was untwisted. */
+/* Untwists one limb after the other, and omits those that fold. *flips: 0 if any limb was untwisted. */
 static orb_status untwist_each(untwisting *u, const orb_corner_table *s, int32_t *flips) {
   orb_map_run *c = u->c;
   const orb_map_twists *all = u->twists;
