@@ -91,8 +91,11 @@ struct Unpacker {
     const int64_t view = editor->add_view(bytes.data(), bytes.size(),
                                           is_attribute ? ORB_GLTF_ARRAY_BUFFER : ORB_GLTF_ELEMENT_ARRAY_BUFFER,
                                           stride == tight ? 0 : stride);
+    static const char *const types[] = {"SCALAR", "VEC2", "VEC3", "VEC4"}; /* where the accessor says something else */
+    set(accessor, "type", cJSON_CreateString(types[values->width - 1]));
     set(accessor, "bufferView", static_cast<double>(view));
     cJSON_DeleteItemFromObjectCaseSensitive(accessor, "byteOffset");
+    cJSON_DeleteItemFromObjectCaseSensitive(accessor, "sparse"); /* not allowed beside Draco, and not read */
     if (!normalized) {
       bound(*values, accessor);
     }
@@ -160,9 +163,10 @@ struct Unpacker {
   }
 
   void unpack() {
-    for (const cJSON *mesh : array_of(doc, "meshes")) {
-      for (const cJSON *primitive : array_of(mesh, "primitives")) {
-        plain_primitive(editable(primitive));
+    const List meshes = array_of(doc, "meshes");
+    for (size_t m = 0; m < meshes.size(); m++) {
+      for (const cJSON *primitive : array_of(meshes[m], "primitives")) {
+        blaming({culprit("meshes", meshes, m)}, [&] { plain_primitive(editable(primitive)); });
       }
     }
     const List views = array_of(doc, "bufferViews");
