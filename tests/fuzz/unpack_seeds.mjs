@@ -2,6 +2,7 @@
 //
 //   cmake --build build --target asset_fixture
 //   node tests/fuzz/unpack_seeds.mjs build-fuzz/seeds/unpack && tests/fuzz/run.sh --pack unpack
+// draco_share and meshopt_twice are inputs that were found: shares that are no integers, members of one name.
 import { execFileSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
