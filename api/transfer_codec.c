@@ -36,6 +36,7 @@ static int read_entry(const cJSON *item, int32_t shape_count, int32_t index, orb
     return REFUSE(problem, index, "Each entry of \"transfer\" must be an object with \"from\" and \"what\".");
   }
   if (!api_members_known(item, "an entry of \"transfer\"", known, problem)) {
+    api_json_member_integer(&problem->facts, "transfer", index);
     return 0;
   }
   const cJSON *from = cJSON_GetObjectItemCaseSensitive(item, "from");

@@ -273,6 +273,15 @@ static orb_status bake_all(orb_context *ctx, baker *b, const int32_t *materials,
   return status;
 }
 
+orb_status orb_bake_refuse(orb_context *ctx) {
+  orb_status status =
+      orb_fail(ctx, ORB_E_BAD_OPTION,
+               "\"transfer\" bakes a texture into the texture coordinates of the first shape, which has none. "
+               "Unwrap it, or leave \"texture\" out.");
+  orb_context_error_edit(ctx)->shape = 0;
+  return status;
+}
+
 orb_status orb_bake(orb_context *ctx, const orb_bake_job *job, orb_baked *out) {
   const orb_mesh *mesh = &job->shape->mesh;
   baker b = {.ctx = ctx, .job = job, .side = 1};
@@ -284,9 +293,7 @@ orb_status orb_bake(orb_context *ctx, const orb_bake_job *job, orb_baked *out) {
   orb_status status = materials ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t count = materials ? list_materials(&b, materials, &area) : 0;
   if (status == ORB_OK && count == 0) {
-    status = orb_fail(ctx, ORB_E_BAD_OPTION,
-                      "\"transfer\" bakes a texture into the texture coordinates of the first shape, which has none. "
-                      "Unwrap it, or leave \"texture\" out.");
+    status = orb_bake_refuse(ctx);
   }
   if (status == ORB_OK) {
     ORB_GO(status, orb_texels_open(ctx, mesh, &texels), done);

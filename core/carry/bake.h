@@ -29,6 +29,9 @@ typedef struct orb_baked {
   int64_t shared; /* texels that several triangles of the asset use */
 } orb_baked;
 
+/* The refusal where the first shape has no texture coordinates. */
+orb_status orb_bake_refuse(orb_context *ctx);
+
 /* Each texel within a triangle of the asset gets the colour at its place on the shape, others that of their neighbours:
  * at first along the rims of charts, then the mean. Free also after an error. ORB_E_BAD_OPTION: no triangle of the
  * asset has texture coordinates, or an image of the shape cannot be read. */

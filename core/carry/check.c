@@ -5,9 +5,11 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "carry/bake.h"
 #include "carry/texels.h"
 #include "format/gltf_add.h"
 #include "format/gltf_given.h"
+#include "transfer/template.h"
 
 static const char *const names[] = {"skin", "color", "texcoord", "targets", "texture"};
 static const char *const titles[] = {"no skin on its closed surface", "no colours of vertices",
@@ -19,8 +21,9 @@ const char *orb_carry_name(orb_carry_what what) {
 
 orb_status orb_carry_blame(orb_context *ctx, orb_status status, int32_t shape, int32_t number) {
   if (status == ORB_E_BAD_OPTION || status == ORB_E_MALFORMED_MESH || status == ORB_E_TOO_LARGE) {
-    orb_context_error_edit(ctx)->shape = shape;
-    orb_context_error_edit(ctx)->transfer = number;
+    orb_error *error = orb_context_error_edit(ctx);
+    error->shape = error->shape >= 0 ? error->shape : shape;
+    error->transfer = number;
   }
   return status;
 }
@@ -55,16 +58,18 @@ orb_status orb_carry_entries(orb_context *ctx, const orb_carry *carries, int32_t
     const orb_carry *carry = &carries[i];
     if ((unsigned)carry->what >= ORB_CARRY_COUNT || carry->from < 0 || carry->from >= shape_count ||
         count > ORB_CARRY_MAX) {
-      return orb_fail(ctx, ORB_E_BAD_OPTION, "Entry %d of \"transfer\" is out of range.", (int)i);
+      orb_status status = orb_fail(ctx, ORB_E_BAD_OPTION, "Entry %d of \"transfer\" is out of range.", (int)i);
+      return orb_carry_blame(ctx, status, -1, i);
     }
     if (carry->what == ORB_CARRY_TEXTURE) {
       ORB_TRY(orb_carry_blame(ctx, check_texture(ctx, carry, i), carry->from, i));
     }
-    skins += carry->what == ORB_CARRY_SKIN;
+    if (carry->what == ORB_CARRY_SKIN && skins++ > 0) {
+      orb_status status = orb_fail(ctx, ORB_E_BAD_OPTION, "An asset can have one skin; \"transfer\" asks for more.");
+      return orb_carry_blame(ctx, status, carry->from, i);
+    }
   }
-  return skins <= 1
-             ? ORB_OK
-             : orb_fail(ctx, ORB_E_BAD_OPTION, "An asset can have one skin; \"transfer\" asks for %d.", (int)skins);
+  return ORB_OK;
 }
 
 /* A skin is tried: its skeleton and their animations are copied to nowhere. */
@@ -111,6 +116,36 @@ static orb_status try_document(orb_context *ctx, orb_carry_what what, const orb_
   }
 }
 
+/* Whether the pictures of the shape can be read, and the first shape has room for them. */
+static orb_status try_texture(orb_context *ctx, const orb_carry_wish *wish, const orb_mesh *mesh) {
+  orb_texels texels = {0};
+  if (!wish->given[0].mesh->texcoords) {
+    return orb_bake_refuse(ctx);
+  }
+  orb_status status = orb_texels_open(ctx, mesh, &texels);
+  orb_texels_close(ctx, &texels);
+  return status;
+}
+
+/* Whether the document of the first shape can get a skin. */
+static orb_status try_room(orb_context *ctx, const orb_carry_wish *wish) {
+  const orb_mesh *file = wish->document, *repaired = wish->given[0].mesh;
+  int32_t *on_surface = ORB_NEW(ctx, int32_t, file->file_vertex_count);
+  if (!on_surface) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < file->file_vertex_count; v++) {
+    on_surface[v] = orb_repaired_vertex(repaired, file, v);
+  }
+  orb_status status =
+      orb_gltf_try_room(ctx, wish->document_bytes, wish->document_size, on_surface, file->file_vertex_count);
+  if (status == ORB_E_BAD_OPTION) {
+    orb_context_error_edit(ctx)->shape = 0;
+  }
+  orb_free(ctx, on_surface);
+  return status;
+}
+
 static orb_status check_one(orb_context *ctx, const orb_carry_wish *wish, int32_t number) {
   const orb_carry *carry = &wish->carries[number];
   const orb_mesh *mesh = wish->given[carry->from].mesh;
@@ -132,13 +167,21 @@ static orb_status check_one(orb_context *ctx, const orb_carry_wish *wish, int32_
     status = orb_carry_blame(ctx, try_document(ctx, carry->what, &file, &has), carry->from, number);
     orb_free(ctx, used);
   }
-  return status == ORB_OK && !has ? orb_carry_refuse(ctx, wish->carries, number) : status;
+  if (status == ORB_OK && !has) {
+    return orb_carry_refuse(ctx, wish->carries, number);
+  }
+  if (status == ORB_OK && carry->what == ORB_CARRY_TEXTURE) {
+    status = orb_carry_blame(ctx, try_texture(ctx, wish, mesh), carry->from, number);
+  } else if (status == ORB_OK && carry->what == ORB_CARRY_SKIN && wish->document) {
+    status = orb_carry_blame(ctx, try_room(ctx, wish), 0, number);
+  }
+  return status;
 }
 
 orb_status orb_carry_check(orb_context *ctx, const orb_carry_wish *wish) {
   ORB_TRY(orb_carry_entries(ctx, wish->carries, wish->carry_count, wish->shape_count));
   for (int32_t i = 0; i < wish->carry_count; i++) {
-    if (!(wish->is_document && wish->carries[i].from == 0)) { /* its document has it */
+    if (!(wish->document && wish->carries[i].from == 0)) { /* its document has it */
       ORB_TRY(check_one(ctx, wish, i));
     }
   }

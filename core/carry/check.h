@@ -12,7 +12,10 @@ typedef struct orb_carry_wish {
   int32_t shape_count;
   const orb_carry *carries;
   int32_t carry_count;
-  int is_document; /* the asset is the document of the first shape */
+  /* The asset is the document of the first shape; NULL: it is not. Before repairs. */
+  const orb_mesh *document;
+  const unsigned char *document_bytes;
+  size_t document_size;
 } orb_carry_wish;
 
 /* Whether the entries fit together. ORB_E_BAD_OPTION. */

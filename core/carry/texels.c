@@ -1,11 +1,13 @@
 #include "carry/texels.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "orbmorph/utf8.h"
 
 enum { NEAREST = 9728, CLAMP = 33071, MIRROR = 33648 }; /* of glTF's samplers */
 
@@ -49,6 +51,21 @@ static int shows_alpha(const orb_mesh *mesh, const orb_material *material) {
   return 0;
 }
 
+static orb_status refuse_image(orb_context *ctx, const orb_mesh *mesh, const orb_material *material) {
+  const int number = (int)(material - mesh->materials);
+  orb_status status = orb_fail(ctx, ORB_E_BAD_OPTION,
+                               "The base colour of material %d cannot be decoded as PNG or JPEG of at most "
+                               "%d pixels a side. Mend it, or leave \"texture\" of \"transfer\" out.",
+                               number, (int)ORB_IMAGE_SIDE_MAX);
+  orb_error *error = orb_context_error_edit(ctx);
+  orb_error_element *element = &error->elements[0];
+  error->element_count = 1;
+  error->element_total = 1;
+  snprintf(element->where, sizeof element->where, "materials[%d]", number);
+  (void)orb_utf8_copy(element->name, sizeof element->name, material->name);
+  return status;
+}
+
 orb_status orb_texels_open(orb_context *ctx, const orb_mesh *mesh, orb_texels *out) {
   *out = (orb_texels){.mesh = mesh, .images = ORB_NEW0(ctx, orb_pixels, mesh->image_count)};
   if (!out->images) {
@@ -66,11 +83,7 @@ orb_status orb_texels_open(orb_context *ctx, const orb_mesh *mesh, orb_texels *o
     }
     orb_status status = orb_image_decode(ctx, mesh->images[i].bytes, mesh->images[i].size, &out->images[i]);
     if (status == ORB_E_CORRUPT || status == ORB_E_TOO_LARGE) {
-      return orb_fail(
-          ctx, ORB_E_BAD_OPTION,
-          "Image %d, the base colour of a material, cannot be decoded as PNG or JPEG of at most %d pixels a "
-          "side. Mend it, or leave \"texture\" of \"transfer\" out.",
-          (int)i, (int)ORB_IMAGE_SIDE_MAX);
+      return refuse_image(ctx, mesh, material);
     }
     ORB_TRY(status);
   }

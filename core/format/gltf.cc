@@ -186,14 +186,16 @@ struct Reader {
     auto add = [&](size_t mesh, const Matrix &matrix, bool visible) {
       std::string name = text_of(meshes[mesh], "name");
       must(orb_build_object(&build, reinterpret_cast<const unsigned char *>(name.data()), name.size()));
-      for (const cJSON *primitive : array_of(meshes[mesh], "primitives")) {
-        if (!cJSON_IsObject(primitive)) {
-          malformed("A glTF primitive is not an object.");
+      blaming({culprit("meshes", meshes, mesh)}, [&] {
+        for (const cJSON *primitive : array_of(meshes[mesh], "primitives")) {
+          if (!cJSON_IsObject(primitive)) {
+            malformed("A glTF primitive is not an object.");
+          }
+          buffers.spend(WORK_OF_PRIMITIVE);
+          add_primitive(primitive, matrix, visible, normals, texcoords);
+          must(orb_context_check(ctx));
         }
-        buffers.spend(WORK_OF_PRIMITIVE);
-        add_primitive(primitive, matrix, visible, normals, texcoords);
-        must(orb_context_check(ctx));
-      }
+      });
     };
     for (size_t i = 0; i < meshes.size(); i++) {
       add(i, first[i] == NONE ? Matrix() : shown[static_cast<size_t>(first[i])].second, first[i] != NONE);

@@ -18,6 +18,7 @@ namespace gltf {
 namespace {
 
 const char *const VARIANTS = "KHR_materials_variants";
+const char *const SKINNED[] = {"JOINTS_0", "WEIGHTS_0"};
 
 struct Adder {
   orb_context *ctx;
@@ -87,13 +88,7 @@ struct Adder {
   }
 
   void add_weights(const Block &block) {
-    static const char *const names[] = {"JOINTS_0", "WEIGHTS_0"};
     const size_t from = 4 * static_cast<size_t>(block.first), count = 4 * block.count;
-    for (const char *name : names) {
-      if (member(attributes_of(block), name)) {
-        refuse_skin(block.mesh);
-      }
-    }
     int64_t joints = NONE;
     if (more.skin.joint_count <= 256) {
       std::vector<unsigned char, Charged<unsigned char>> bytes{Charged<unsigned char>(ctx)};
@@ -104,9 +99,9 @@ struct Adder {
     } else {
       joints = editor.add_list(more.skin.joints + from, 2 * count, ORB_GLTF_USHORT, block.count, "VEC4", true);
     }
-    set(attributes_of(block), names[0], static_cast<double>(joints));
+    set(attributes_of(block), SKINNED[0], static_cast<double>(joints));
     int64_t weights = editor.add(floats_of(block, more.skin.weights, 4), 4, true, false);
-    set(attributes_of(block), names[1], static_cast<double>(weights));
+    set(attributes_of(block), SKINNED[1], static_cast<double>(weights));
   }
 
   [[noreturn]] void refuse_skin(size_t mesh) const {
@@ -116,9 +111,15 @@ struct Adder {
                 {culprit("meshes", array_of(doc, "meshes"), mesh)}};
   }
 
-  void add_skin() {
+  /* Refuses a skin beside another one, and one for several places. */
+  void check_skin() const {
     const List all = array_of(doc, "meshes");
     for (const Block &block : blocks) {
+      for (const char *name : SKINNED) {
+        if (member(member(block.primitive, "attributes"), name)) {
+          refuse_skin(block.mesh);
+        }
+      }
       if (std::memcmp(block.matrix.m, blocks[0].matrix.m, sizeof block.matrix.m) != 0) {
         throw Fault{
             ORB_E_BAD_OPTION,
@@ -126,14 +127,23 @@ struct Adder {
             "not fit. Leave \"skin\" of \"transfer\" out, or use another method than 'template'.",
             {culprit("meshes", all, blocks[0].mesh), culprit("meshes", all, block.mesh)}};
       }
+    }
+    for (const cJSON *node : array_of(doc, "nodes")) {
+      const int64_t mesh = index_of(node, "mesh");
+      if (mesh != NONE && meshes.count(static_cast<size_t>(mesh)) && index_of(node, "skin") != NONE) {
+        refuse_skin(static_cast<size_t>(mesh));
+      }
+    }
+  }
+
+  void add_skin() {
+    check_skin();
+    for (const Block &block : blocks) {
       add_weights(block);
     }
     int64_t skin = copy_skin(ctx, doc, &editor, more.skin, blocks[0].matrix);
     for (const cJSON *node : array_of(doc, "nodes")) {
       if (index_of(node, "mesh") != NONE && meshes.count(static_cast<size_t>(index_of(node, "mesh")))) {
-        if (index_of(node, "skin") != NONE) {
-          refuse_skin(static_cast<size_t>(index_of(node, "mesh")));
-        }
         set(editable(node), "skin", static_cast<double>(skin));
       }
     }
@@ -224,8 +234,12 @@ struct Adder {
   }
 
   cJSON *mappings_of(const Block &block) {
-    cJSON *extensions = object_in(editable(block.primitive), "extensions");
-    return array_in(object_in(extensions, VARIANTS), "mappings");
+    cJSON *out = nullptr;
+    blaming({culprit("meshes", array_of(doc, "meshes"), block.mesh)}, [&] {
+      cJSON *extensions = object_in(editable(block.primitive), "extensions");
+      out = array_in(object_in(extensions, VARIANTS), "mappings");
+    });
+    return out;
   }
 
   void add_variant(orb_added_variant *variant, cJSON *list) {
@@ -317,6 +331,17 @@ extern "C" orb_status orb_gltf_add(orb_context *ctx, const unsigned char *bytes,
     buffers.load(document.root(), document.chunk(), size);
     gltf::Adder adder(ctx, document, buffers.buffer(0), *additions);
     adder.add(out);
+  });
+}
+
+extern "C" orb_status orb_gltf_try_room(orb_context *ctx, const unsigned char *bytes, size_t size,
+                                        const int32_t *on_surface, int32_t vertex_count) {
+  orb_additions none = {};
+  none.vertex_count = vertex_count;
+  none.on_surface = on_surface;
+  return gltf::guarded(ctx, size, [&] {
+    gltf::Document document(ctx, bytes, size, size >= 4 && std::memcmp(bytes, "glTF", 4) == 0);
+    gltf::Adder(ctx, document, gltf::Bytes{}, none).check_skin();
   });
 }
 

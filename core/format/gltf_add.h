@@ -48,6 +48,11 @@ typedef struct orb_additions {
 ORB_MUST_CHECK orb_status orb_gltf_add(orb_context *ctx, const unsigned char *bytes, size_t size,
                                        const orb_additions *additions, orb_buffer *out);
 
+/* Whether the meshes of a document can get a skin: ORB_E_BAD_OPTION as orb_gltf_add() would. on_surface: as in
+ * orb_additions. */
+ORB_MUST_CHECK orb_status orb_gltf_try_room(orb_context *ctx, const unsigned char *bytes, size_t size,
+                                            const int32_t *on_surface, int32_t vertex_count);
+
 /* Whether the skeleton of a skin and its animations can be copied: fails as orb_gltf_add() would. joints, weights and
  * surface are not used. */
 ORB_MUST_CHECK orb_status orb_gltf_try_skin(orb_context *ctx, const orb_added_skin *skin);

@@ -56,11 +56,20 @@ T *allocate(orb_context *ctx, size_t count) {
   return block;
 }
 
+/* An attribute of a block; a fault names its mesh. */
+Numbers attribute_of(const Given &given, const Block &block, const std::string &name, size_t low, size_t high,
+                     size_t *width) {
+  Numbers out{Charged<double>(given.ctx)};
+  blaming({culprit("meshes", given.meshes, block.mesh)},
+          [&] { out = given.buffers.attribute(block.primitive, name.c_str(), block.count, low, high, width); });
+  return out;
+}
+
 void read_set(const Given &given, const orb_given_file &file, const std::string &name, int32_t width, float *out) {
   std::fill_n(out, static_cast<size_t>(width) * static_cast<size_t>(file.vertex_count), width == 4 ? 1.0f : 0.0f);
   for (const Block *block : given.used_blocks(file)) {
     size_t has = 0, low = width == 4 ? 3 : 2, high = static_cast<size_t>(width);
-    Numbers values = given.buffers.attribute(block->primitive, name.c_str(), block->count, low, high, &has);
+    Numbers values = attribute_of(given, *block, name, low, high, &has);
     for (size_t i = 0; !values.empty() && i < block->count; i++) {
       float *to = out + static_cast<size_t>(width) * (static_cast<size_t>(block->first) + i);
       for (size_t k = 0; k < has; k++) {
@@ -92,6 +101,18 @@ std::string title_of(const Given &given, size_t mesh) {
   return "mesh " + std::to_string(mesh) + " (\"" + text_of(given.meshes[mesh], "name").substr(0, 60) + "\")";
 }
 
+/* A mesh and the nodes that have it. */
+Culprits mesh_and_nodes(const Given &given, size_t mesh) {
+  Culprits out{culprit("meshes", given.meshes, mesh)};
+  const List nodes = array_of(given.document.root(), "nodes");
+  for (size_t n = 0; n < nodes.size(); n++) {
+    if (index_of(nodes[n], "mesh") == static_cast<int64_t>(mesh)) {
+      out.push_back(culprit("nodes", nodes, n));
+    }
+  }
+  return out;
+}
+
 /* The skin with which the nodes show each mesh that is used; NONE: without one. */
 std::map<size_t, int64_t> skins_of(const Given &given, const std::vector<const Block *> &used) {
   std::map<size_t, int64_t> out;
@@ -109,7 +130,7 @@ std::map<size_t, int64_t> skins_of(const Given &given, const std::vector<const B
       throw Fault{ORB_E_BAD_OPTION,
                   "The nodes of " + title_of(given, found->first) +
                       " have several skins, and an asset can have one. Leave \"skin\" out.",
-                  {culprit("meshes", given.meshes, found->first), culprit("nodes", nodes, n)}};
+                  mesh_and_nodes(given, found->first)};
     }
     found->second = skin;
   }
@@ -172,8 +193,8 @@ int32_t sets_of(const std::vector<const Block *> &blocks) {
 void read_weights(const Given &given, const Block &block, int32_t set, orb_given_skin *out) {
   size_t width = 0;
   std::string number = std::to_string(set);
-  Numbers joints = given.buffers.attribute(block.primitive, ("JOINTS_" + number).c_str(), block.count, 4, 4, &width);
-  Numbers weights = given.buffers.attribute(block.primitive, ("WEIGHTS_" + number).c_str(), block.count, 4, 4, &width);
+  Numbers joints = attribute_of(given, block, "JOINTS_" + number, 4, 4, &width);
+  Numbers weights = attribute_of(given, block, "WEIGHTS_" + number, 4, 4, &width);
   for (size_t i = 0; !joints.empty() && !weights.empty() && i < 4 * block.count; i++) {
     if (!(joints[i] >= 0 && joints[i] < out->joint_count)) {
       malformed("A vertex of " + title_of(given, block.mesh) + " names a joint that its skin does not have.",
@@ -191,10 +212,12 @@ void read_skin(const Given &given, const orb_given_file &file, orb_given_skin *o
   if (blocks.empty()) {
     return;
   }
-  const cJSON *skin = element(array_of(given.document.root(), "skins"), out->skin, "skin");
+  const List skins = array_of(given.document.root(), "skins");
+  const cJSON *skin = element(skins, out->skin, "skin");
   size_t joints = array_of(skin, "joints").size();
   if (joints == 0 || joints > ORB_GIVEN_JOINTS) {
-    malformed("The skin of the glTF file has no joints, or more than " + std::to_string(ORB_GIVEN_JOINTS) + ".");
+    malformed("The skin of the glTF file has no joints, or more than " + std::to_string(ORB_GIVEN_JOINTS) + ".",
+              {culprit("skins", skins, static_cast<size_t>(out->skin))});
   }
   out->joint_count = static_cast<int32_t>(joints);
   out->influences = 4 * sets_of(blocks);
@@ -235,8 +258,7 @@ void read_moves(const Given &given, const Block &block, const cJSON *target, flo
   size_t width = 0;
   Numbers move = given.buffers.accessor(index, &width);
   if (width != 3 || move.size() != 3 * block.count) {
-    malformed("A morph target of " + title_of(given, block.mesh) + " does not fit its POSITION.",
-              {culprit("meshes", given.meshes, block.mesh)});
+    malformed("A morph target of " + title_of(given, block.mesh) + " does not fit its POSITION.");
   }
   for (size_t i = 0; i < block.count; i++) {
     for (int r = 0; r < 3; r++) {
@@ -267,7 +289,8 @@ void read_targets(const Given &given, const orb_given_file &file, orb_given_targ
       if (!known.count(names[k])) {
         if (out->count == ORB_GIVEN_TARGETS) {
           throw Fault{ORB_E_TOO_LARGE,
-                      "\"transfer\" takes at most " + std::to_string(ORB_GIVEN_TARGETS) + " morph targets of a file."};
+                      "\"transfer\" takes at most " + std::to_string(ORB_GIVEN_TARGETS) + " morph targets of a file.",
+                      {culprit("meshes", given.meshes, block->mesh)}};
         }
         known[names[k]] = out->count;
         (void)orb_utf8_copy(out->names[out->count], ORB_NAME_MAX, names[k].c_str());
@@ -275,7 +298,8 @@ void read_targets(const Given &given, const orb_given_file &file, orb_given_targ
         float *moves = out->moves[out->count++] = allocate<float>(given.ctx, count);
         std::fill_n(moves, count, 0.0f);
       }
-      read_moves(given, *block, targets[k], out->moves[known[names[k]]]);
+      blaming({culprit("meshes", given.meshes, block->mesh)},
+              [&] { read_moves(given, *block, targets[k], out->moves[known[names[k]]]); });
     }
   }
 }
@@ -317,12 +341,13 @@ void read_charts(const Given &given, orb_given_charts *out) {
   for (const Block &block : given.blocks) {
     size_t width = 0, first = static_cast<size_t>(block.first);
     std::string name = "TEXCOORD_" + std::to_string(painted_set(all, block.primitive));
-    Numbers uv = given.buffers.attribute(block.primitive, name.c_str(), block.count, 2, 2, &width);
+    Numbers uv = attribute_of(given, block, name, 2, 2, &width);
     for (size_t i = 0; i < uv.size(); i++) {
       out->uv[2 * first + i] = static_cast<float>(uv[i]);
       out->has[first + i / 2] = 1;
     }
-    read_triangles(given, block, &triangles, &materials);
+    blaming({culprit("meshes", given.meshes, block.mesh)},
+            [&] { read_triangles(given, block, &triangles, &materials); });
   }
   out->vertex_count = static_cast<int32_t>(vertices);
   out->triangles = allocate<int32_t>(given.ctx, triangles.size());

@@ -338,7 +338,7 @@ struct Keeper {
       size_t targets = array_of(primitives[p], "targets").size();
       had = p == 0 ? targets : had;
       if (targets != had) {
-        malformed("The primitives of " + title(m) + " have different numbers of morph targets.", mesh_and_nodes(m));
+        malformed("The primitives of " + title(m) + " have different numbers of morph targets.");
       }
       add_targets(primitives[p], m, from, frame, editor);
       from += is_surface(primitives[p]) ? static_cast<int64_t>(count_of(primitives[p])) : 0;
@@ -392,7 +392,7 @@ struct Keeper {
         if (showed[m] > 1) {
           refuse_copies(m);
         }
-        widen_mesh(m, &editor);
+        blaming(mesh_and_nodes(m), [&] { widen_mesh(m, &editor); });
       }
     }
     if (!widen_weights(ctx, doc, buffers, widened, shapes, &editor)) {

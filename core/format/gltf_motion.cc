@@ -20,8 +20,7 @@ struct Motion {
 
   [[noreturn]] void misfit() const {
     malformed("Animation " + std::to_string(animation.index) +
-                  " of the glTF file moves its skeleton, and its values do not fit its times.",
-              {animation});
+              " of the glTF file moves its skeleton, and its values do not fit its times.");
   }
 
   Floats floats_of(const Numbers &values) const {
@@ -141,10 +140,11 @@ void copy_animations(const Skeleton &from, const cJSON *source, const Buffers &b
   for (size_t i = 0; i < animations.size(); i++) {
     must(orb_context_check(from.ctx));
     motion.animation = culprit("animations", animations, i);
-    Owned copy = copy_animation(&motion, animations[i]);
-    if (copy) {
-      copies.push_back(std::move(copy));
-    }
+    blaming({motion.animation}, [&] {
+      if (Owned copy = copy_animation(&motion, animations[i])) {
+        copies.push_back(std::move(copy));
+      }
+    });
   }
   if (!copies.empty()) {
     put_first(&copies, doc);

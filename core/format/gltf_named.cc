@@ -52,8 +52,10 @@ std::vector<bool> named_meshes(const cJSON *doc, size_t mesh_count, const orb_do
       }
     }
     if (!found) {
-      throw Fault{ORB_E_BAD_OPTION, "\"template\" names the node \"" + std::string(parts.nodes[i]).substr(0, 60) +
-                                        "\", which the document of the first shape does not have."};
+      throw Fault{ORB_E_BAD_OPTION,
+                  "\"template\" names the node \"" + std::string(parts.nodes[i]).substr(0, 60) +
+                      "\", which the document of the first shape does not have.",
+                  {{"nodes", NOWHERE, parts.nodes[i]}}};
     }
   }
   return named;

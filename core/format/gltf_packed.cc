@@ -22,6 +22,12 @@ Bytes part_of(const Bytes &bytes, size_t offset, size_t length) {
   return Bytes{bytes.at + offset, length};
 }
 
+/* What an integer gives as a share, without the rounding of 32-bit floats; below -1 it is -1. */
+double nearest_share(double value, double most) {
+  const double whole = std::round(value * most);
+  return std::fabs(value * most - whole) < SHARE_ERROR ? std::fmax(whole / most, -1) : value;
+}
+
 }  // namespace
 
 double component_most(int64_t type) {
@@ -126,8 +132,8 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
     Values values{Numbers(points * width, 0, Charged<double>(ctx_)), width};
     /* Draco turns what it knows as shares of a whole into fractions by itself. */
     const int64_t type = whole(accessor, "componentType", 0);
-    const bool is_raw = cJSON_IsTrue(member(accessor, "normalized")) && !attribute->normalized();
-    const double unit = is_raw ? component_most(type) : 1;
+    const bool is_share = cJSON_IsTrue(member(accessor, "normalized")) && type != 5126;
+    const double unit = is_share && !attribute->normalized() ? component_most(type) : 1;
     for (size_t i = 0; i < points; i++) {
       float value[4] = {0, 0, 0, 0};
       auto at = attribute->mapped_index(draco::PointIndex(static_cast<uint32_t>(i)));
@@ -135,7 +141,8 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
         malformed("A compressed glTF primitive has an attribute that is not numbers.");
       }
       for (size_t k = 0; k < width; k++) {
-        values.list[i * width + k] = static_cast<double>(value[k]) / unit;
+        const double number = static_cast<double>(value[k]) / unit;
+        values.list[i * width + k] = is_share ? nearest_share(number, component_most(type)) : number;
       }
     }
     accessors_.insert_or_assign(index, std::move(values));

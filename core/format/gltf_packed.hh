@@ -13,6 +13,9 @@ namespace gltf {
 /* The largest value of a component, which a normalized one calls 1; 1 for floats. */
 double component_most(int64_t type);
 
+/* Of integers of 16 bits, once they are shares of their largest value as 32-bit floats. */
+const double SHARE_ERROR = 1.0 / 64;
+
 class Packed {
  public:
   using Octets = std::vector<unsigned char, Charged<unsigned char>>;

@@ -91,7 +91,11 @@ void note(orb_context *ctx, const Culprits &culprits) {
       break;
     }
     orb_error_element *out = &error->elements[error->element_count++];
-    std::snprintf(out->where, sizeof out->where, "%s[%zu]", part.list.c_str(), part.index);
+    if (part.index == NOWHERE) {
+      std::snprintf(out->where, sizeof out->where, "%s", part.list.c_str());
+    } else {
+      std::snprintf(out->where, sizeof out->where, "%s[%zu]", part.list.c_str(), part.index);
+    }
     orb_utf8_copy(out->name, sizeof out->name, part.name.c_str());
   }
 }

@@ -180,8 +180,10 @@ int64_t add_binds(orb_context *ctx, const Matrices &binds, Editor *editor) {
 
 }  // namespace
 
-int64_t copy_skin(orb_context *ctx, cJSON *doc, Editor *editor, const orb_added_skin &from, const Matrix &shown) {
-  Document source(ctx, from.bytes, from.size, from.size >= 4 && std::memcmp(from.bytes, "glTF", 4) == 0);
+namespace {
+
+int64_t copy_skin_of(orb_context *ctx, const Document &source, cJSON *doc, Editor *editor, const orb_added_skin &from,
+                     const Matrix &shown) {
   Buffers buffers(ctx);
   buffers.load(source.root(), source.chunk(), from.size);
   Skeleton skeleton(ctx, source.root(), from.skin);
@@ -219,6 +221,17 @@ int64_t copy_skin(orb_context *ctx, cJSON *doc, Editor *editor, const orb_added_
   if (root < number.size() && number[root] != NONE) {
     set(skin, "skeleton", static_cast<double>(number[root]));
   }
+  return index;
+}
+
+}  // namespace
+
+int64_t copy_skin(orb_context *ctx, cJSON *doc, Editor *editor, const orb_added_skin &from, const Matrix &shown) {
+  const Document source(ctx, from.bytes, from.size, from.size >= 4 && std::memcmp(from.bytes, "glTF", 4) == 0);
+  const List skins = array_of(source.root(), "skins");
+  int64_t index = NONE;
+  blaming({culprit("skins", skins, static_cast<size_t>(from.skin))},
+          [&] { index = copy_skin_of(ctx, source, doc, editor, from, shown); });
   return index;
 }
 

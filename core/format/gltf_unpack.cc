@@ -12,17 +12,26 @@ namespace {
 
 const char MESHOPT[] = "EXT_meshopt_compression", DRACO[] = "KHR_draco_mesh_compression";
 
-/* Takes a member out of an object, and the object's list of them with the last one. */
-void remove_extension(cJSON *object, const char *name) {
-  cJSON *list = editable(member(object, "extensions"));
-  cJSON_DeleteItemFromObjectCaseSensitive(list, name);
-  if (list && !list->child) {
-    cJSON_DeleteItemFromObjectCaseSensitive(object, "extensions");
+bool has_extension(const cJSON *object, const char *name) {
+  return member(member(object, "extensions"), name) != nullptr;
+}
+
+/* Takes a member out of an object. A malformed one may have several of the name, of which the first is read. */
+void remove_member(cJSON *object, const char *name) {
+  while (member(object, name)) {
+    cJSON_DeleteItemFromObjectCaseSensitive(object, name);
   }
 }
 
-bool has_extension(const cJSON *object, const char *name) {
-  return member(member(object, "extensions"), name) != nullptr;
+/* Takes an extension out of an object, and the object's list of them with the last one. */
+void remove_extension(cJSON *object, const char *name) {
+  while (has_extension(object, name)) {
+    cJSON *list = editable(member(object, "extensions"));
+    remove_member(list, name);
+    if (!list->child) {
+      cJSON_DeleteItemFromObjectCaseSensitive(object, "extensions");
+    }
+  }
 }
 
 struct Unpacker {
@@ -43,13 +52,15 @@ struct Unpacker {
     Packed::Octets out(values.list.size() / values.width * stride, 0, Charged<unsigned char>(ctx));
     for (size_t i = 0; i < values.list.size(); i++) {
       unsigned char *at = &out[i / values.width * stride + i % values.width * size];
-      const double value = normalized ? std::round(values.list[i] * most) : values.list[i];
+      const double exact = normalized ? values.list[i] * most : values.list[i];
+      const double value = normalized ? std::round(exact) : exact;
       if (type == ORB_GLTF_FLOAT) {
         const float number = static_cast<float>(values.list[i]);
         std::memcpy(at, &number, sizeof number);
         continue;
       }
-      if (!(value >= least && value <= most) || value != std::floor(value)) {
+      if (!(value >= least && value <= most) || value != std::floor(value) ||
+          !(std::fabs(value - exact) < SHARE_ERROR)) {
         malformed("A compressed glTF primitive has values that its accessors cannot hold.");
       }
       const uint64_t number = static_cast<uint64_t>(static_cast<int64_t>(value));
@@ -91,8 +102,11 @@ struct Unpacker {
     const int64_t view = editor->add_view(bytes.data(), bytes.size(),
                                           is_attribute ? ORB_GLTF_ARRAY_BUFFER : ORB_GLTF_ELEMENT_ARRAY_BUFFER,
                                           stride == tight ? 0 : stride);
+    static const char *const types[] = {"SCALAR", "VEC2", "VEC3", "VEC4"}; /* where the accessor says something else */
+    set(accessor, "type", cJSON_CreateString(types[values->width - 1]));
     set(accessor, "bufferView", static_cast<double>(view));
-    cJSON_DeleteItemFromObjectCaseSensitive(accessor, "byteOffset");
+    remove_member(accessor, "byteOffset");
+    remove_member(accessor, "sparse"); /* not allowed beside Draco, and not read */
     if (!normalized) {
       bound(*values, accessor);
     }
@@ -160,9 +174,10 @@ struct Unpacker {
   }
 
   void unpack() {
-    for (const cJSON *mesh : array_of(doc, "meshes")) {
-      for (const cJSON *primitive : array_of(mesh, "primitives")) {
-        plain_primitive(editable(primitive));
+    const List meshes = array_of(doc, "meshes");
+    for (size_t m = 0; m < meshes.size(); m++) {
+      for (const cJSON *primitive : array_of(meshes[m], "primitives")) {
+        blaming({culprit("meshes", meshes, m)}, [&] { plain_primitive(editable(primitive)); });
       }
     }
     const List views = array_of(doc, "bufferViews");

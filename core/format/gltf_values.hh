@@ -20,6 +20,8 @@ namespace gltf {
 
 using List = std::vector<const cJSON *>;
 
+const size_t NOWHERE = SIZE_MAX; /* the index of a part that the document does not have */
+
 /* Parts of a document, such as {"meshes", 0, name}, that a refusal is about. */
 struct Culprit {
   std::string list;
@@ -40,6 +42,19 @@ struct Fault {
 
 [[noreturn]] inline void malformed(const std::string &detail, Culprits culprits = {}) {
   throw Fault{ORB_E_MALFORMED_MESH, detail, std::move(culprits)};
+}
+
+/* Runs work(). A document that it refuses without naming parts is refused for these. */
+template <typename Work>
+void blaming(const Culprits &culprits, const Work &work) {
+  try {
+    work();
+  } catch (Fault &fault) {
+    if (fault.culprits.empty()) {
+      fault.culprits = culprits;
+    }
+    throw;
+  }
 }
 
 /* A failed call of the C side: its status becomes an exception, its error record stays. */

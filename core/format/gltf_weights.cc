@@ -55,11 +55,11 @@ struct Weights {
   }
 
   /* The keyframes of a sampler with zeros for the new targets. */
-  int64_t widen_keys(const cJSON *sampler, size_t had, const Culprit &animation) const {
+  int64_t widen_keys(const cJSON *sampler, size_t had) const {
     size_t width = 0;
     Numbers old = buffers.accessor(whole(sampler, "output", NONE), &width);
     if (had == 0 || width != 1 || old.size() % had != 0 || old.empty()) {
-      malformed("An animation of weights does not fit the morph targets of its mesh.", {animation});
+      malformed("An animation of weights does not fit the morph targets of its mesh.");
     }
     size_t keys = old.size() / had, wide = had + more();
     Floats fresh{Charged<float>(ctx)};
@@ -72,7 +72,7 @@ struct Weights {
     return editor->add(fresh, 1, false, false);
   }
 
-  void widen_animation(cJSON *animation, const Culprit &self) const {
+  void widen_animation(cJSON *animation) const {
     const List channels = array_of(animation, "channels"), samplers = array_of(animation, "samplers");
     std::map<std::pair<int64_t, int64_t>, int64_t> fresh; /* sampler and targets before: the sampler in its place */
     std::map<int64_t, std::set<int64_t>> users;           /* of a sampler: targets before, NONE: not of ours */
@@ -91,7 +91,7 @@ struct Weights {
       auto key = std::make_pair(sampler, before);
       if (!fresh.count(key)) {
         const cJSON *old = element(samplers, sampler, "sampler");
-        double output = static_cast<double>(widen_keys(old, static_cast<size_t>(before), self));
+        double output = static_cast<double>(widen_keys(old, static_cast<size_t>(before)));
         if (users[sampler].size() == 1) {
           set(editable(old), "output", output);
           fresh[key] = sampler;
@@ -173,7 +173,7 @@ struct Weights {
     }
     const List animations = array_of(doc, "animations");
     for (size_t i = 0; i < animations.size(); i++) {
-      widen_animation(editable(animations[i]), culprit("animations", animations, i));
+      blaming({culprit("animations", animations, i)}, [&] { widen_animation(editable(animations[i])); });
     }
     return shapes.key_count == 0 || add_animation();
   }

@@ -105,7 +105,9 @@ orb_status orb_merge_check(orb_context *ctx, const orb_align_shape *shapes, int3
                          .shape_count = shape_count,
                          .carries = options->carries,
                          .carry_count = options->carry_count,
-                         .is_document = is_document};
+                         .document = is_document ? options->file : NULL,
+                         .document_bytes = options->file_bytes,
+                         .document_size = options->file_size};
   return orb_carry_check(ctx, &wish);
 }
 

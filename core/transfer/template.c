@@ -100,6 +100,7 @@ static orb_status make_vertices(maker *m, orb_template *made) {
   if (status == ORB_OK && corners + m->count > INT32_MAX) {
     status = orb_fail(m->ctx, ORB_E_TOO_LARGE,
                       "The first shape has too many triangles for the method 'template'; use 'adaptive'.");
+    orb_context_error_edit(m->ctx)->shape = 0;
   }
   if (status == ORB_OK) {
     made->mesh.triangles = ORB_NEW(m->ctx, int32_t, corners + m->count);

@@ -16,7 +16,7 @@
 # same goes to build-fuzz/sums/TARGET. build-fuzz/results has a line "passed TARGET" or "failed TARGET" for each.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
-all=(obj off ply stl 3mf gltf glb keep carry json query range config sphere decode http token view client)
+all=(obj off ply stl 3mf gltf glb keep unpack carry json query range config sphere decode http token view client)
 
 sums() {
   local name

@@ -180,6 +180,19 @@ test('a mesh that the scene shows twice is refused', async (t) => {
 
 const grown = (by, { positions, ...rest }) => ({ ...rest, positions: positions.map((p) => p.map((x) => by * x)) });
 
+test('an upload whose vertices do not fit is refused by its mesh', async (t) => {
+  const d = await daemon(t);
+  const edit = (gltf) => {
+    gltf.meshes[0].name = 'egg';
+    gltf.accessors[gltf.meshes[0].primitives[0].attributes.TEXCOORD_0].count -= 1;
+  };
+  const egg = shapes.egg(2);
+  const { status, json } = await d.upload(writeGlb({ ...egg, uv: egg.positions.map(([x, y]) => [x, y]), edit }));
+  assert.equal(status, 400);
+  assert.match(json.detail, /TEXCOORD_0 does not fit its POSITION/);
+  assert.deepEqual(json.elements, [{ where: 'meshes[0]', name: 'egg' }]);
+});
+
 test('a document that cannot get targets is refused by the parts at fault', async (t) => {
   const d = await daemon(t);
   const refused = async (egg, edit, detail, elements, type = '/problems/bad-option') => {
@@ -230,6 +243,21 @@ test('a document that cannot get targets is refused by the parts at fault', asyn
     [{ where: 'animations[1]', name: 'talk' }],
     '/problems/malformed-mesh',
   );
+  const short = (gltf, push) => {
+    misfit(gltf, push);
+    gltf.meshes[0].name = 'face';
+    gltf.animations = undefined;
+    const [primitive] = gltf.meshes[0].primitives;
+    primitive.targets = [primitive.targets[0]];
+    gltf.meshes[0].primitives.push({ ...primitive, targets: [], mode: 0 });
+  };
+  await refused(
+    shapes.egg(2),
+    short,
+    /different numbers of morph targets/,
+    [{ where: 'meshes[0]', name: 'face' }, { where: 'nodes[0]' }],
+    '/problems/malformed-mesh',
+  );
 });
 
 test('a request names the meshes or nodes that are the surface', async (t) => {
@@ -248,7 +276,11 @@ test('a request names the meshes or nodes that are the surface', async (t) => {
   for (const [template, why, elements] of [
     [{ meshes: [0, 1] }, /names mesh 0 \("eye"\), but the closed surface has no vertex of it/, eye],
     [{ nodes: ['left eye'] }, /names mesh 0 \("eye"\)/, [...eye, { where: 'meshes[1]', name: 'Body' }]],
-    [{ nodes: ['nobody'] }, /the node "nobody", which the document of the first shape does not have/],
+    [
+      { nodes: ['nobody'] },
+      /the node "nobody", which the document of the first shape does not have/,
+      [{ where: 'nodes', name: 'nobody' }],
+    ],
     [{ meshes: [2] }, /names mesh 2, but the document of the first shape has 2 meshes/, [{ where: 'meshes[2]' }]],
   ]) {
     const { problem } = await d.make('/v1/supermeshes', { ...request, template });

@@ -45,7 +45,9 @@ test('what cannot be transferred is refused by its entry', async (t) => {
     assert.match(reply.json.detail, why);
     assert.equal(reply.json.transfer, entry);
   }
-  assertProblem(await d.post('/v1/supermeshes', { ...request, transfer: [{ ...skin, to: 2 }] }), 422, 'unknown-member');
+  const unknown = await d.post('/v1/supermeshes', { ...request, transfer: [skin, { ...skin, to: 2 }] });
+  assertProblem(unknown, 422, 'unknown-member');
+  assert.deepEqual([unknown.json.member, unknown.json.transfer], ['to', 1]);
   for (const [what, why] of [
     ['color', /no colours of vertices/],
     ['texcoord', /no texture coordinates/],

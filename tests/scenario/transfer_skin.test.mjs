@@ -291,6 +291,68 @@ test('a skin that cannot be taken is refused', async (t) => {
   assertProblem(await d.get(`${own.asset}?profile=meshopt`), 422, 'bad-option');
 });
 
+test('what a file has in a form that cannot be carried is refused by its part', async (t) => {
+  const d = await daemon(t);
+  const egg = await uploaded(d, shapes.obj(shapes.egg(2)), { name: 'egg' });
+  const body = [{ where: 'meshes[1]', name: 'Body' }];
+  const primitive = (gltf) => gltf.meshes[1].primitives[0];
+  for (const [what, edit, why, elements] of [
+    [
+      'skin',
+      (gltf) => {
+        gltf.skins[0].name = 'bones';
+        gltf.accessors[gltf.skins[0].inverseBindMatrices].count -= 1;
+      },
+      /inverse bind matrices/,
+      [{ where: 'skins[0]', name: 'bones' }],
+    ],
+    [
+      'skin',
+      (gltf) => {
+        primitive(gltf).attributes.WEIGHTS_0 = primitive(gltf).attributes.TEXCOORD_0;
+      },
+      /WEIGHTS_0 does not fit/,
+      body,
+    ],
+    [
+      'targets',
+      (gltf) => {
+        primitive(gltf).targets[0].POSITION = primitive(gltf).attributes.TEXCOORD_0;
+      },
+      /target of mesh 1 \("Body"\) does not fit/,
+      body,
+    ],
+    [
+      'color',
+      (gltf) => {
+        primitive(gltf).attributes.COLOR_0 = primitive(gltf).attributes.POSITION;
+        primitive(gltf).attributes.COLOR_1 = primitive(gltf).attributes.TEXCOORD_0;
+      },
+      /COLOR_1 does not fit/,
+      body,
+    ],
+  ]) {
+    const other = await uploaded(d, rigged({ edit }).bytes, { name: 'body', repair: 'largest_component' });
+    const request = { shapes: [egg, other], asset, transfer: [{ from: 1, what }] };
+    const { problem } = await d.make('/v1/supermeshes', request);
+    assert.match(problem?.detail, why);
+    assert.equal(problem.type, '/problems/malformed-mesh');
+    assert.deepEqual([problem.shape, problem.transfer, problem.elements], [1, 0, elements]);
+  }
+});
+
+test('a skin for a document that has no room is refused before the work', async (t) => {
+  const d = await daemon(t);
+  const { bytes } = rigged();
+  const body = await uploaded(d, bytes, { name: 'body', repair: 'largest_component' });
+  const request = { shapes: [body, { ...body, name: 'other' }], remesh: { method: 'template' }, asset };
+  const { problem } = await d.make('/v1/supermeshes', { ...request, transfer: [{ from: 1, what: 'skin' }] });
+  assert.match(problem?.detail, /has a skin already/);
+  assert.deepEqual([problem.shape, problem.transfer], [0, 0]);
+  assert.deepEqual(problem.elements, [{ where: 'meshes[1]', name: 'Body' }]);
+  assert.ok((await d.made('/v1/supermeshes', request)).timings_ms.align > 0, 'the alignment was not computed for it');
+});
+
 test('a skeleton that cannot be copied is refused before the work', async (t) => {
   const d = await daemon(t);
   const { bytes: wave } = rigged({

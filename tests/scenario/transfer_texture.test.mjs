@@ -176,19 +176,27 @@ test('a texture that cannot be baked is refused', async (t) => {
   const bare = await uploaded(d, shapes.obj(shapes.egg(2)), { name: 'egg' });
   const egg = await uploaded(d, writeGlb(unwrapped()), { name: 'unwrapped' });
   const bean = await uploaded(d, painted(), { name: 'bean' });
+  const named = (gltf) => {
+    gltf.materials[0].name = 'peel';
+  };
   const image = writePng(8, 8, paint);
   image[image.indexOf('IDAT') + 20] ^= 255;
-  const broken = await uploaded(d, painted({ image }), { name: 'broken' });
+  const broken = await uploaded(d, painted({ image, edit: named }), { name: 'broken' });
   const transfer = [{ from: 1, what: 'texture' }];
-  for (const [pair, why] of [
-    [[bare, bean], /texture coordinates of the first shape, which has none/],
-    [[egg, bare], /shape 1, which has no base colour texture/],
-    [[egg, broken], /Image 0.*cannot be decoded/],
+  const elements = [{ where: 'materials[0]', name: 'peel' }];
+  for (const [pair, why, members] of [
+    [[bare, bean], /texture coordinates of the first shape, which has none/, { shape: 0 }],
+    [[egg, bare], /shape 1, which has no base colour texture/, { shape: 1 }],
+    [[egg, broken], /base colour of material 0 cannot be decoded/, { shape: 1, elements }],
   ]) {
     const { problem } = await d.make('/v1/supermeshes', { shapes: pair, asset, transfer });
     assert.equal(problem?.type, '/problems/bad-option');
     assert.match(problem.detail, why);
+    const { shape, transfer: entry, elements: parts } = problem;
+    assert.deepEqual({ shape, entry, parts }, { entry: 0, parts: members.elements, shape: members.shape });
   }
+  const { timings_ms } = await d.made('/v1/supermeshes', { shapes: [egg, broken], asset });
+  assert.ok(timings_ms.align > 0, 'the alignment was not computed for what is refused');
 });
 
 test('charts that lie on each other are reported', async (t) => {

@@ -4,6 +4,8 @@
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { obj, parse } from '../scenario/support/shapes.mjs';
+import { tunnels } from '../tools/tunnels.mjs';
 import {
   addFiles,
   counted,
@@ -31,6 +33,17 @@ const without = (file, keep) => ({
   mimeType: 'text/plain',
   buffer: Buffer.from(readFileSync(sample(file), 'utf8').split('\n').filter(keep()).join('\n')),
 });
+/** The dog with tunnels through neck, body and legs. */
+const pierced = () => {
+  const dog = parse(readFileSync(sample('dog.obj'), 'utf8'));
+  const at = [
+    [-0.5, 0.95, 0.35],
+    [0.1, 0.9, 0.35],
+    [0.6, 1.1, 0.3],
+    [0.45, 0.4, 0.35],
+  ];
+  return { name: 'dog.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(tunnels(dog, at))) };
+};
 const open = () =>
   without('dog.obj', () => {
     let left = 60;
@@ -84,6 +97,12 @@ export const SCENES = {
     async (page) => {
       await page.locator('input[type=file]').first().setInputFiles([open()]);
       await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
+    },
+  ],
+  handles: [
+    async (page) => {
+      await page.locator('input[type=file]').first().setInputFiles([pierced()]);
+      await until(() => page.getByText('Shown in red on the model.').count(), 'the loops are found');
     },
   ],
   landmarks: [

@@ -2,6 +2,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
+import { rigged } from '../samples/rigged.mjs';
 import { grating, obj, torus } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { button, countPixels, json, openPage, sample, settled, until } from './support.mjs';
@@ -128,6 +129,22 @@ test('loose pieces are shown in red, and the largest can be kept', async () => {
   assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 150 && g < 110 && b < 110)) > 50, 'red is drawn');
   await button(page, 'Keep the largest piece').click();
   await until(() => page.locator('.card.ready').count(), 'it is repaired');
+  await done();
+});
+
+test('pieces of one name are told apart, and each can be kept', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const file = { name: 'body.glb', mimeType: 'model/gltf-binary', buffer: rigged().bytes };
+  await page.locator('input[type=file]').first().setInputFiles(file);
+  await page.locator('.card.refused').waitFor();
+  assert.deepEqual(await page.getByRole('alert').getByRole('button').allInnerTexts(), [
+    'Keep the largest piece',
+    'Keep “eye”, piece 1 (4 triangles)',
+    'Keep “eye”, piece 2 (4 triangles)',
+  ]);
+  await button(page, 'Keep “eye”, piece 2 (4 triangles)').click();
+  const mesh = await mended(page, 'body');
+  assert.equal(mesh.triangles, 4);
   await done();
 });
 

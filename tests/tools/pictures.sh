@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures of the documents anew, from the samples, with the programs of build/bin:
 #   docs/morph.webp                    the film of the README, made in the studio
-#   docs/studio.png                    the studio, in Chromium
+#   docs/studio.png, handles           the studio, in Chromium
 #   docs/tutorial.png, tutorial-sheet  the tutorial's page in Chromium and its sheet (they need tests/node_modules)
 #   docs/holes-open.png, holes-filled  half an elephant, open and filled
 # docs/rigged.png is the sheet of tests/long.sh rigged.
@@ -24,6 +24,7 @@ export ORBMORPH_SERVER
 samples=tests/samples
 node tests/tools/film.mjs
 ORB_PICTURE=docs/studio.png node tests/studio/looks.mjs landmarks
+ORB_PICTURE=docs/handles.png node tests/studio/looks.mjs handles
 ORB_PICTURES=1 node --test tests/conformance/tutorial.test.mjs
 
 node tests/tools/holes.mjs "$work/half.obj"

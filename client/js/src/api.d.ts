@@ -816,7 +816,7 @@ export type ProblemMalformedJson = {
 
 /** A part of a glTF document. */
 export type DocumentElement = {
-  /** Its place, such as meshes[0] or nodes[3]. */
+  /** Its place, such as meshes[0] or nodes[3]; without a number, such as nodes, where the document does not have it. */
   where: string;
   /** Its name in the document; absent if it has none. */
   name?: string;
@@ -995,6 +995,10 @@ export type ProblemTooLarge = {
   shape?: number;
   /** The number of the entry of `transfer` in the request, from 0. */
   transfer?: number;
+  /** How many parts of the shape's glTF document are at fault. */
+  element_count?: number;
+  /** The first of them. */
+  elements?: DocumentElement[];
   /** The limit that a compressed body exceeds: unpacked size over packed size. */
   ratio_limit?: number;
 };
@@ -1190,6 +1194,8 @@ export type ProblemUnknownMember = {
   detail: string;
   /** The name of the member. */
   member: string;
+  /** The number of the entry of `transfer` in the request, from 0. */
+  transfer?: number;
 };
 
 export type ProblemInvalidRequest = {

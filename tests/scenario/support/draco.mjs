@@ -17,8 +17,12 @@ async function load(file) {
   return new Promise((resolve) => loaded.exports({ onModuleLoaded: (module) => resolve({ module }) }));
 }
 
-/** A GLB of one primitive that Draco has compressed, with Google's encoder. colors: four bytes a vertex. */
-export async function draco({ positions, triangles, colors }) {
+/**
+ * A GLB of one primitive that Draco has compressed, with Google's encoder. colors: four bytes a vertex. sets: attributes by
+ * name, {rows, componentType, normalized} with floats, bytes or 16-bit numbers. method: of the encoder. edit(json)
+ * changes the document.
+ */
+export async function draco({ positions, triangles, colors, sets = {}, method = 'EDGEBREAKER', edit = () => {} }) {
   const { module } = await load(encoder);
   const made = new module.Encoder();
   const mesh = new module.Mesh();
@@ -36,6 +40,16 @@ export async function draco({ positions, triangles, colors }) {
     const bytes = new Uint8Array(colors.flat());
     ids.COLOR_0 = builder.AddUInt8Attribute(mesh, module.COLOR, positions.length, 4, bytes);
   }
+  for (const [name, { rows, componentType }] of Object.entries(sets)) {
+    const [add, Values] = {
+      5121: ['AddUInt8Attribute', Uint8Array],
+      5123: ['AddUInt16Attribute', Uint16Array],
+      5126: ['AddFloatAttributeToMesh', Float32Array],
+    }[componentType];
+    const kind = name.startsWith('TEXCOORD') ? module.TEX_COORD : module.GENERIC;
+    ids[name] = builder[add](mesh, kind, rows.length, rows[0].length, new Values(rows.flat()));
+  }
+  made.SetEncodingMethod(module[`MESH_${method}_ENCODING`]);
   made.SetAttributeQuantization(module.POSITION, 14);
   const out = new module.DracoInt8Array();
   const length = made.EncodeMeshToDracoBuffer(mesh, out);
@@ -67,6 +81,10 @@ export async function draco({ positions, triangles, colors }) {
     scenes: [{ nodes: [0] }],
     scene: 0,
   };
+  const [{ attributes }] = json.meshes[0].primitives;
+  for (const [name, { rows, ...accessor }] of Object.entries(sets))
+    attributes[name] = json.accessors.push({ ...accessor, type: `VEC${rows[0].length}`, count: rows.length }) - 1;
+  edit(json);
   const pad = (b, fill) => Buffer.concat([b, Buffer.alloc((4 - (b.length % 4)) % 4, fill)]);
   const chunk = (type, b) => {
     const head = Buffer.alloc(8);

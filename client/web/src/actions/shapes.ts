@@ -220,13 +220,14 @@ const sizeFor = (lengths: number[]) => {
   return longest > SMALL ? Number((1.01 * longest).toPrecision(3)) : longest && SMALL;
 };
 
-/** The pieces after the largest, as many as there is room for. */
+/** The pieces after the largest, as many as there is room for; those of one name by their numbers. */
 function otherParts(parts: unknown): { repair: string; label: string }[] {
   if (!Array.isArray(parts)) return [];
-  return parts.slice(1, 5).map(({ part, triangles, name }) => ({
-    repair: `safe,part:${part}`,
-    label: `Keep ${name ? `“${name}”` : `piece ${part}`} (${triangles.toLocaleString('en')} triangles)`,
-  }));
+  const shared = (name?: string) => parts.filter((part) => part.name === name).length > 1;
+  return parts.slice(1, 5).map(({ part, triangles, name }) => {
+    const title = [name && `“${name}”`, (!name || shared(name)) && `piece ${part}`].filter(Boolean).join(', ');
+    return { repair: `safe,part:${part}`, label: `Keep ${title} (${triangles.toLocaleString('en')} triangles)` };
+  });
 }
 
 /** One button closes all handles, those too that are not among the loops on show. */

@@ -125,6 +125,7 @@ static const orb_map_params DEFAULTS = {
                .over = 1.6,
                .reach = 0.01,
                .folded = 0.6,
+               .apart = 0.5,
                .outlier = 0.2,
                .least_cotangent = 0.02,
                .most_cotangent = 10},

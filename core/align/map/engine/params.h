@@ -296,6 +296,7 @@ typedef struct orb_map_params {
                                towards their shoulders, which are larger on the sphere */
     double folded;          /* factor on the trust in the target of a vertex of a flipped triangle, in each round.
                                Smaller ones let whole limbs go, 1 leaves the pockets of faces folded */
+    double apart;           /* a target farther than this from those of most neighbours is an outlier: a few edges */
     double outlier;         /* distance from its target at which a vertex counts a quarter */
     double least_cotangent; /* of an edge: obtuse triangles would push their neighbours away, */
     double most_cotangent;  /* and flat ones would hold them */

@@ -1,8 +1,8 @@
 /* Minimises ∫ |∇x|² + trust · |x − target|² / reach² over the moving shape by over-relaxed Gauss–Seidel sweeps, where x
- * is the point on the sphere; then trusts each target by how far x has moved from it, measured on the fixed shape, and
- * less where triangles are flipped; and so on (iteratively reweighted least squares). So a fold is smoothed over a
- * growing distance until it is none, and all other places stay where they are. Between the rounds x is not normalised:
- * it stays near the sphere. */
+ * is the point on the sphere; outliers have no trust. Then trusts each target by how far x has moved from it, measured
+ * on the fixed shape, and less where triangles are flipped; and so on (iteratively reweighted least squares). So a fold
+ * is smoothed over a growing distance, and all other places stay where they are. Between the rounds x is not
+ * normalised: it stays near the sphere. */
 #include "align/map/starts/smooth.h"
 
 #include <math.h>
@@ -19,7 +19,7 @@ typedef struct smoothing {
   const orb_map_params *params;
   double *target; /* 3 a vertex: where it was placed, on the sphere */
   double *trust;  /* 0 to 1 */
-  double *smooth; /* likewise: how long a vertex has been without flips */
+  double *smooth; /* likewise: 0 for outliers, else how long a vertex has been without flips */
 } smoothing;
 
 static double bounded(const smoothing *s, double cotangent) {
@@ -45,6 +45,20 @@ static void relax(const smoothing *s, int32_t v) {
   }
   for (int k = 0; k < 3; k++) {
     x[k] += s->params->smooth.over * (sum[k] / all - x[k]);
+  }
+}
+
+/* Does not trust a target that is far from those of most neighbours. */
+static void doubt_outliers(const smoothing *s) {
+  const orb_map_level *l = s->level;
+  const double far = s->params->smooth.apart;
+  for (int32_t v = 0; v < l->count; v++) {
+    const double scale2 = fmax(l->density[v], ORB_TINY); /* not 0 where the fixed shape has a flat triangle */
+    int32_t near = 0;
+    for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+      near += orb_distance2(s->target + 3 * (size_t)v, s->target + 3 * (size_t)l->spoke[i].q) <= scale2 * far * far;
+    }
+    s->trust[v] = s->smooth[v] = 2 * near < l->start[v + 1] - l->start[v] ? 0 : 1;
   }
 }
 
@@ -86,9 +100,7 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l) {
     goto done;
   }
   memcpy(s.target, l->x, 3 * (size_t)l->count * sizeof *s.target);
-  for (int32_t v = 0; v < l->count; v++) {
-    s.trust[v] = s.smooth[v] = 1;
-  }
+  doubt_outliers(&s);
   for (int round = 0; round < p->smooth.rounds; round++) {
     for (int sweep = 0; sweep < p->smooth.sweeps; sweep++) {
       for (int32_t v = 0; v < l->count; v++) {
