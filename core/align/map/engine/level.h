@@ -12,8 +12,9 @@
  *   vector/           the step for several vertices at once
  *   sweep.h           sweeps of such steps
  *   untangle.h        clearing flips on the sphere
- *   unfold.h          clearing the last ones for certain
+ *   unfold.h          clearing the last ones for certain, and setting parts anew
  *   run.h             what one call of orb_compose() holds, and the points that the fixed shape has on the sphere
+ *   iron.h            crumpled parts that are set anew
  *   rounds.h, near.h  rounds of sweeps and untangling; levels that are nearly a map
  *   spread.h          samples
  */
