@@ -3,13 +3,13 @@
 //   ORB_POSTGRESQL_OPTIONS='-c shared_preload_libraries=pg_stat_statements' \
 //     tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/bench/scaling.mjs
 //
-// All nodes are on this machine, so each that works is held to a share of a core, ORB_SHARE (0.4): it is stopped for the rest of
-// every 100 ms, as the quota of a cgroup does. That says something only if the cores are not busy otherwise; the column "got" is
+// All nodes are on this machine, so a cgroup holds each that works to a share of a core, ORB_SHARE (0.4), as `CPUQuota` of systemd
+// does; this takes root and a cgroup file system. That says something only if the cores are not busy otherwise; the column "got" is
 // what the nodes really had, and says whether they waited for the database and S3 instead. ORB_JOBS (200) embeddings of
 // 20,480 triangles, a quarter of them for each ORB_LEVEL below 5, for each number of nodes, ORB_NODES (1,2,4). ORBMORPHD names the daemon.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { readdirSync, readFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, writeFileSync } from 'node:fs';
 import { mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
@@ -25,7 +25,7 @@ const share = Number(process.env.ORB_SHARE ?? 0.4);
 const jobs = Number(process.env.ORB_JOBS ?? 200);
 const level = Number(process.env.ORB_LEVEL ?? 5);
 const counts = (process.env.ORB_NODES ?? '1,2,4').split(',').map(Number);
-const PERIOD = 100; // ms
+const PERIOD = 10_000; // µs; a longer one would pause a node within its requests to the database, where others wait for it
 const GOALS = new Map([
   [2, 1.8],
   [4, 3.4],
@@ -45,28 +45,17 @@ function members(root) {
   return all;
 }
 
-/** Stops and continues a node in turn. */
-function hold(root) {
-  let timer;
-  const signal = (name) => {
-    for (const { pid } of members(root))
-      try {
-        process.kill(pid, name);
-      } catch {} // it has just ended
-  };
-  const run = () => {
-    signal('SIGCONT');
-    timer = setTimeout(stop, PERIOD * share);
-  };
-  const stop = () => {
-    signal('SIGSTOP');
-    timer = setTimeout(run, PERIOD * (1 - share));
-  };
-  run();
-  return () => {
-    clearTimeout(timer);
-    signal('SIGCONT');
-  };
+/** A cgroup that holds what is in it to the share: its file of processes, and a function that removes it. */
+function held(name) {
+  const first = existsSync('/sys/fs/cgroup/cgroup.controllers');
+  const group = path.join(first ? '/sys/fs/cgroup' : '/sys/fs/cgroup/cpu', name);
+  mkdirSync(group);
+  if (first) writeFileSync(path.join(group, 'cpu.max'), `${share * PERIOD} ${PERIOD}`);
+  else {
+    writeFileSync(path.join(group, 'cpu.cfs_period_us'), `${PERIOD}`);
+    writeFileSync(path.join(group, 'cpu.cfs_quota_us'), `${share * PERIOD}`);
+  }
+  return { processes: path.join(group, 'cgroup.procs'), remove: () => rmdirSync(group) };
 }
 
 /** Seconds of processor time that a node and its jobs have had. */
@@ -106,7 +95,7 @@ async function measure(count) {
     nodes.push(node);
     return node.start();
   };
-  const releases = [];
+  const groups = [];
   try {
     const serve = await start([], '--role', 'serve');
     for (let i = 0; i < jobs; i++) {
@@ -116,9 +105,12 @@ async function measure(count) {
     }
     const before = cost(catalogue);
     const works = [];
-    for (let i = 0; i < count; i++) works.push(await start([], '--role', 'work', '--workers', '1'));
+    for (let i = 0; i < count; i++) {
+      groups.push(held(`orbmorph-${name}-${i}`));
+      const enter = ['/bin/sh', '-c', `echo $$ >${groups[i].processes} && exec "$0" "$@"`];
+      works.push(await start(enter, '--role', 'work', '--workers', '1'));
+    }
     const roots = works.map(({ child }) => child.pid);
-    for (const root of roots) releases.push(hold(root));
     const had = roots.map(cpu);
     // The database says when the last job ended: asking it more often would take time from the nodes.
     const ended = () => sql(catalogue, 'SELECT count(*), max(finished) FROM job WHERE state=2 /* bench */').split('|');
@@ -129,11 +121,11 @@ async function measure(count) {
     const each = cost(catalogue).map((value, i) => (value - before[i]) / jobs);
     return { rate: (1000 * (jobs - first)) / (Number(ended()[1]) - began), got, each };
   } finally {
-    for (const release of releases) release();
     for (const node of nodes) {
       await node.stop();
       await rm(node.data, { recursive: true, force: true });
     }
+    for (const { remove } of groups) remove();
   }
 }
 
