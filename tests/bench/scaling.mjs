@@ -83,6 +83,14 @@ function cost(catalogue) {
   return text.split('|').slice(1).map(Number);
 }
 
+/** The process of the server, whose children are its connections. */
+function postmaster(catalogue) {
+  const [pid] = sql(catalogue, "SELECT pid FROM pg_stat_activity WHERE backend_type='checkpointer' /* bench */").split(
+    ' ',
+  );
+  return Number(readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ')[1]);
+}
+
 async function measure(count) {
   const name = `scaling${process.pid}-${count}`;
   const catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
@@ -104,6 +112,8 @@ async function measure(count) {
       assert.equal((await serve.post('/v1/embeddings', { mesh: mesh.id })).status, 202);
     }
     const before = cost(catalogue);
+    const server = postmaster(catalogue);
+    const spent = cpu(server);
     const works = [];
     for (let i = 0; i < count; i++) {
       groups.push(held(`orbmorph-${name}-${i}`));
@@ -119,6 +129,7 @@ async function measure(count) {
     while (Number(ended()[0]) < jobs) await new Promise((done) => setTimeout(done, 1000));
     const got = roots.map((root, i) => ((cpu(root) - had[i]) * 1000) / (Date.now() - began));
     const each = cost(catalogue).map((value, i) => (value - before[i]) / jobs);
+    each.push((1000 * (cpu(server) - spent)) / jobs);
     return { rate: (1000 * (jobs - first)) / (Number(ended()[1]) - began), got, each };
   } finally {
     for (const node of nodes) {
@@ -130,7 +141,7 @@ async function measure(count) {
 }
 
 console.log(
-  '| nodes | jobs a second | times one | got, of a core | statements a job | transactions a job | rows a job | WAL a job |\n|---|---|---|---|---|---|---|---|',
+  '| nodes | jobs a second | times one | got, of a core | statements a job | transactions a job | rows a job | WAL a job | its CPU a job |\n|---|---|---|---|---|---|---|---|---|',
 );
 sql(process.env.ORB_POSTGRESQL, 'CREATE EXTENSION IF NOT EXISTS pg_stat_statements');
 let one;
@@ -140,10 +151,10 @@ for (const count of counts) {
   one ??= rate;
   const times = rate / one;
   missed += times < (GOALS.get(count) ?? 0);
-  const [statements, transactions, rows, wal] = each.map((value) => value.toFixed(0));
+  const [statements, transactions, rows, wal, server] = each.map((value) => value.toFixed(0));
   const shares = got.map((value) => value.toFixed(2)).join(' ');
   console.log(
-    `| ${count} | ${rate.toFixed(2)} | ${times.toFixed(2)} | ${shares} | ${statements} | ${transactions} | ${rows} | ${wal} B |`,
+    `| ${count} | ${rate.toFixed(2)} | ${times.toFixed(2)} | ${shares} | ${statements} | ${transactions} | ${rows} | ${wal} B | ${server} ms |`,
   );
 }
 process.exitCode = missed ? 1 : 0;

@@ -17,9 +17,10 @@ async function tenants(t, ...args) {
   const d = await daemon(t, { args: ['--auth', 'on', '--workers', '1', ...args] });
   const token = (...words) =>
     promisify(execFile)(binaries.daemon, ['token', ...words, '--data', d.data]).then(({ stdout }) => stdout.trim());
-  const add = async (name, scope, ...more) => ({
-    headers: { authorization: `Bearer ${await token('add', name, '--scope', scope, ...more)}` },
-  });
+  const add = async (name, scope, ...more) => {
+    const who = { headers: { authorization: `Bearer ${await token('add', name, '--scope', scope, ...more)}` } };
+    return process.env.ORB_NODES ? d.known(who) : who;
+  };
   const upload = (who, bytes, query = {}) => d.post('/v1/meshes', bytes, { ...who, query });
   const list = async (who, what) => (await d.get(`/v1/${what}`, who)).json[what].map(({ id }) => id);
   const end = async (who, job) => {
