@@ -239,6 +239,8 @@ static void on_shared_change(void *user, const char *what) {
   server *srv = user;
   if (what[0] == 't') {
     reload_callers(srv);
+  } else if (what[0] == 'u') {
+    callers_recount(srv->callers, what + 1);
   } else if (what[0] == '*') {
     cache_drop_all(srv->descriptions);
     reload_callers(srv);

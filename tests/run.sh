@@ -63,7 +63,7 @@ count_junit() {
 # Its daemon takes the numeric objects of the release build. So scenarios that mostly compute, and those that look at
 # documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL and S3: their unit
 # tests run here.
-release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|migrate|nodes|.*_(postgresql|cluster)'
+release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|migrate|nodes|cluster'
 # These test more without sanitizers, and run in both builds. All others have run with sanitizers when a full run comes to
 # the release build, and run there only if the build with sanitizers failed.
 in_both='clock|isolate|webhooks|deploy|slow|real_meshes'

@@ -221,5 +221,11 @@ const char *const postgresql_migrations[] = {
      */
     "CREATE TABLE deletion(node ident PRIMARY KEY, until BIGINT NOT NULL);"
     "CREATE INDEX job_small ON job(owner, cost) WHERE state=0 AND waits=0 AND kind<>2;",
+    /* Nodes hear how much a tenant with a quota stores. No twin in SQLite, which one daemon uses. */
+    "CREATE FUNCTION bytes_told() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"
+    " IF (TG_OP='INSERT' OR NEW.bytes<>OLD.bytes)"
+    "  AND EXISTS(SELECT 1 FROM token WHERE tenant=NEW.name AND quota_bytes>0)"
+    "  THEN PERFORM tell(TG_TABLE_SCHEMA, 'u' || NEW.name); END IF; RETURN NULL; END $$;"
+    "CREATE TRIGGER bytes_told AFTER INSERT OR UPDATE OF bytes ON tenant FOR EACH ROW EXECUTE FUNCTION bytes_told();",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];

@@ -3,13 +3,13 @@
 //   ORB_POSTGRESQL_OPTIONS='-c shared_preload_libraries=pg_stat_statements' \
 //     tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/bench/scaling.mjs
 //
-// All nodes are on this machine, so each that works is held to a share of a core, ORB_SHARE (0.4): it is stopped for the rest of
-// every 100 ms, as the quota of a cgroup does. That says something only if the cores are not busy otherwise; the column "got" is
+// All nodes are on this machine, so a cgroup holds each that works to a share of a core, ORB_SHARE (0.4), as `CPUQuota` of systemd
+// does; this takes root and a cgroup file system. That says something only if the cores are not busy otherwise; the column "got" is
 // what the nodes really had, and says whether they waited for the database and S3 instead. ORB_JOBS (200) embeddings of
 // 20,480 triangles, a quarter of them for each ORB_LEVEL below 5, for each number of nodes, ORB_NODES (1,2,4). ORBMORPHD names the daemon.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { readdirSync, readFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, writeFileSync } from 'node:fs';
 import { mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
@@ -25,7 +25,7 @@ const share = Number(process.env.ORB_SHARE ?? 0.4);
 const jobs = Number(process.env.ORB_JOBS ?? 200);
 const level = Number(process.env.ORB_LEVEL ?? 5);
 const counts = (process.env.ORB_NODES ?? '1,2,4').split(',').map(Number);
-const PERIOD = 100; // ms
+const PERIOD = 10_000; // µs; a longer one would pause a node within its requests to the database, where others wait for it
 const GOALS = new Map([
   [2, 1.8],
   [4, 3.4],
@@ -45,28 +45,17 @@ function members(root) {
   return all;
 }
 
-/** Stops and continues a node in turn. */
-function hold(root) {
-  let timer;
-  const signal = (name) => {
-    for (const { pid } of members(root))
-      try {
-        process.kill(pid, name);
-      } catch {} // it has just ended
-  };
-  const run = () => {
-    signal('SIGCONT');
-    timer = setTimeout(stop, PERIOD * share);
-  };
-  const stop = () => {
-    signal('SIGSTOP');
-    timer = setTimeout(run, PERIOD * (1 - share));
-  };
-  run();
-  return () => {
-    clearTimeout(timer);
-    signal('SIGCONT');
-  };
+/** A cgroup that holds what is in it to the share: its file of processes, and a function that removes it. */
+function held(name) {
+  const first = existsSync('/sys/fs/cgroup/cgroup.controllers');
+  const group = path.join(first ? '/sys/fs/cgroup' : '/sys/fs/cgroup/cpu', name);
+  mkdirSync(group);
+  if (first) writeFileSync(path.join(group, 'cpu.max'), `${share * PERIOD} ${PERIOD}`);
+  else {
+    writeFileSync(path.join(group, 'cpu.cfs_period_us'), `${PERIOD}`);
+    writeFileSync(path.join(group, 'cpu.cfs_quota_us'), `${share * PERIOD}`);
+  }
+  return { processes: path.join(group, 'cgroup.procs'), remove: () => rmdirSync(group) };
 }
 
 /** Seconds of processor time that a node and its jobs have had. */
@@ -94,6 +83,14 @@ function cost(catalogue) {
   return text.split('|').slice(1).map(Number);
 }
 
+/** The process of the server, whose children are its connections. */
+function postmaster(catalogue) {
+  const [pid] = sql(catalogue, "SELECT pid FROM pg_stat_activity WHERE backend_type='checkpointer' /* bench */").split(
+    ' ',
+  );
+  return Number(readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ')[1]);
+}
+
 async function measure(count) {
   const name = `scaling${process.pid}-${count}`;
   const catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
@@ -106,7 +103,7 @@ async function measure(count) {
     nodes.push(node);
     return node.start();
   };
-  const releases = [];
+  const groups = [];
   try {
     const serve = await start([], '--role', 'serve');
     for (let i = 0; i < jobs; i++) {
@@ -115,10 +112,15 @@ async function measure(count) {
       assert.equal((await serve.post('/v1/embeddings', { mesh: mesh.id })).status, 202);
     }
     const before = cost(catalogue);
+    const server = postmaster(catalogue);
+    const spent = cpu(server);
     const works = [];
-    for (let i = 0; i < count; i++) works.push(await start([], '--role', 'work', '--workers', '1'));
+    for (let i = 0; i < count; i++) {
+      groups.push(held(`orbmorph-${name}-${i}`));
+      const enter = ['/bin/sh', '-c', `echo $$ >${groups[i].processes} && exec "$0" "$@"`];
+      works.push(await start(enter, '--role', 'work', '--workers', '1'));
+    }
     const roots = works.map(({ child }) => child.pid);
-    for (const root of roots) releases.push(hold(root));
     const had = roots.map(cpu);
     // The database says when the last job ended: asking it more often would take time from the nodes.
     const ended = () => sql(catalogue, 'SELECT count(*), max(finished) FROM job WHERE state=2 /* bench */').split('|');
@@ -127,18 +129,19 @@ async function measure(count) {
     while (Number(ended()[0]) < jobs) await new Promise((done) => setTimeout(done, 1000));
     const got = roots.map((root, i) => ((cpu(root) - had[i]) * 1000) / (Date.now() - began));
     const each = cost(catalogue).map((value, i) => (value - before[i]) / jobs);
+    each.push((1000 * (cpu(server) - spent)) / jobs);
     return { rate: (1000 * (jobs - first)) / (Number(ended()[1]) - began), got, each };
   } finally {
-    for (const release of releases) release();
     for (const node of nodes) {
       await node.stop();
       await rm(node.data, { recursive: true, force: true });
     }
+    for (const { remove } of groups) remove();
   }
 }
 
 console.log(
-  '| nodes | jobs a second | times one | got, of a core | statements a job | transactions a job | rows a job | WAL a job |\n|---|---|---|---|---|---|---|---|',
+  '| nodes | jobs a second | times one | got, of a core | statements a job | transactions a job | rows a job | WAL a job | its CPU a job |\n|---|---|---|---|---|---|---|---|---|',
 );
 sql(process.env.ORB_POSTGRESQL, 'CREATE EXTENSION IF NOT EXISTS pg_stat_statements');
 let one;
@@ -148,10 +151,10 @@ for (const count of counts) {
   one ??= rate;
   const times = rate / one;
   missed += times < (GOALS.get(count) ?? 0);
-  const [statements, transactions, rows, wal] = each.map((value) => value.toFixed(0));
+  const [statements, transactions, rows, wal, server] = each.map((value) => value.toFixed(0));
   const shares = got.map((value) => value.toFixed(2)).join(' ');
   console.log(
-    `| ${count} | ${rate.toFixed(2)} | ${times.toFixed(2)} | ${shares} | ${statements} | ${transactions} | ${rows} | ${wal} B |`,
+    `| ${count} | ${rate.toFixed(2)} | ${times.toFixed(2)} | ${shares} | ${statements} | ${transactions} | ${rows} | ${wal} B | ${server} ms |`,
   );
 }
 process.exitCode = missed ? 1 : 0;

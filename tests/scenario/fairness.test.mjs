@@ -23,7 +23,8 @@ const bearer = async (d, name, ...more) => {
     '--data',
     d.data,
   ]);
-  return { headers: { authorization: `Bearer ${stdout.trim()}` } };
+  const who = { headers: { authorization: `Bearer ${stdout.trim()}` } };
+  return process.env.ORB_NODES ? d.known(who) : who;
 };
 /** Uploads the mesh and asks for its embedding; the job. */
 async function submit(d, seed, levels, options = {}, more = {}) {

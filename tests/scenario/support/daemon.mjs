@@ -130,6 +130,16 @@ export class Daemon {
     }
   }
 
+  /** Waits until a new token is known to each of several nodes, which answer by turns and hear of it by a notice. */
+  async known(options) {
+    let known = 0;
+    await until(async () => {
+      known = (await this.get('/v1/jobs', options)).status === 401 ? 0 : known + 1;
+      return known >= Number(process.env.ORB_NODES);
+    }, 'all nodes know the token');
+    return options;
+  }
+
   async request(method, target, { body, headers, query, signal } = {}) {
     const url = new URL(target, this.url);
     for (const [name, value] of Object.entries(query ?? {})) url.searchParams.set(name, value);
