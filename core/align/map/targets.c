@@ -1,10 +1,10 @@
 /* A start from the targets is nearly always a map: unfolding (engine/unfold.h) clears what flips are left. Where the
  * targets were folded it has crumpled, in fingers and in the pockets of a face, and how much is close to chance. So it
- * is drawn to the targets at once, which smooths most of it. Where that leads to no map of shapes that correspond,
- * passes through samples of the best map follow, and then three more starts, until one is such a map: from the targets
- * on two coarser levels, and from a registration in space through samples of them. Then passes and a draw bring the
- * energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no pass helps, the
- * map is drawn to the given targets.
+ * is ironed (engine/iron.h) and drawn to the targets at once, which smooths most of it. Where that leads to no map of
+ * shapes that correspond, passes through samples of the best map follow, and then two more starts, until one is such a
+ * map: from the targets on a coarser level, and from a registration in space through samples of them. Then passes and a
+ * draw bring the energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no
+ * pass helps, the map is drawn to the given targets.
  *
  * Where that gives no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
  * and is optimised on a coarse level, so several are tried, and the best one is refined. Pairs of the match that are
@@ -25,6 +25,11 @@ static void allow(orb_map_run *c) {
   c->work = c->work > least ? c->work : least;
 }
 
+/* Up to which a map is not improved. */
+static double good_energy(const orb_map_run *c) {
+  return c->keeps_angles ? c->params.energy.good : c->params.targets.alike;
+}
+
 static orb_status start_through_samples(orb_map_run *c) {
   allow(c);
   c->samples_follow_target = 1;
@@ -34,10 +39,10 @@ static orb_status start_through_samples(orb_map_run *c) {
 }
 
 /* From the targets on a coarser level. */
-static orb_status start_coarser(orb_map_run *c, int32_t size) {
+static orb_status start_coarser(orb_map_run *c) {
   const int32_t usual = c->params.level.spatial;
   allow(c);
-  c->params.level.spatial = size;
+  c->params.level.spatial = c->params.level.given;
   orb_status status = orb_map_run_start(c, ORB_MAP_SPATIAL);
   c->params.level.spatial = usual;
   return status;
@@ -84,15 +89,15 @@ static orb_status run_first(orb_map_run *c) {
 /* What leads on from the first start, until there is a map of shapes that correspond. */
 static orb_status run_starts(orb_map_run *c) {
   const orb_map_params *p = &c->params;
-  if (c->best_energy > p->energy.good && c->best_energy <= p->targets.crumpled) {
+  if (c->best_energy > good_energy(c) && c->best_energy <= p->targets.crumpled) {
     ORB_TRY(draw(c));
   }
   if (c->best_energy > p->energy.poor) {
     ORB_TRY(run_passes(c));
     ORB_TRY(orb_map_register(c, 0));
   }
-  for (int i = 0; i < 2 && c->best_energy > p->energy.poor; i++) {
-    ORB_TRY(start_coarser(c, p->level.given[i]));
+  if (c->best_energy > p->energy.poor) {
+    ORB_TRY(start_coarser(c));
   }
   return c->best_energy > p->energy.poor ? start_through_samples(c) : ORB_OK;
 }
@@ -105,11 +110,11 @@ orb_status orb_map_follow_targets(orb_map_run *c) {
   }
   ORB_TRY(run_starts(c));
   double started = c->best_energy;
-  if (started <= p->energy.good || started > p->targets.hopeless) {
+  if (started <= good_energy(c) || started > p->targets.hopeless) {
     return ORB_OK;
   }
   ORB_TRY(run_passes(c));
-  if (c->best_energy <= p->energy.good || c->best_energy > p->targets.drawn) {
+  if (c->best_energy <= good_energy(c) || c->best_energy > p->targets.drawn) {
     return ORB_OK;
   }
   if (!(c->best_energy < started)) {
@@ -127,5 +132,5 @@ orb_status orb_map_follow_targets(orb_map_run *c) {
 orb_status orb_map_walk_to_targets(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   ORB_TRY(start_guided(c));
-  return c->best_energy > p->energy.good && c->best_energy <= p->energy.poor ? run_passes(c) : ORB_OK;
+  return c->best_energy > good_energy(c) && c->best_energy <= p->energy.poor ? run_passes(c) : ORB_OK;
 }

@@ -61,7 +61,7 @@ typedef struct orb_map_params {
   /* Levels of a start, and sweeps on them. */
   struct {
     int32_t spatial;    /* level at which a start from spatial targets begins. Coarser is faster and folds more */
-    int32_t given[2];   /* the same for further attempts at targets that are given */
+    int32_t given;      /* the same for a further attempt at targets that are given */
     int32_t mapped;     /* level at which a start from a map begins: a coarser one would fold it */
     int32_t last;       /* level beyond which a start gives up untangling */
     int32_t kept;       /* least vertices of the coarsest level if vertices are kept on it, */
@@ -94,6 +94,8 @@ typedef struct orb_map_params {
   struct {
     int work;        /* least that each step after the first has, as work.all: a start that is given up takes some */
     double hopeless; /* energy of a start above which nothing else is tried */
+    double alike;    /* energy up to which a map is good on spheres that keep areas: these shapes are alike, or agree in
+                        their landmarks' distances, so less is within reach than energy.good */
     double crumpled; /* energy of the first start up to which it is drawn at once */
     double drawn;    /* above which the map is not drawn: it stays caught */
     double gain;     /* a draw below this share of the energy before it opens the way for one more pass, */
@@ -154,6 +156,8 @@ typedef struct orb_map_params {
   /* Clearing flips: rounds of sweeps against a growing barrier, then untangling. */
   struct {
     int32_t hopeless;      /* one flip in fewer triangles than this: the start is given up */
+    int32_t unfold;        /* at most one flip in so many triangles is unfolded where no targets are given: these starts
+                              compete with walks, which are better than what a large fold leaves */
     int rounds;            /* of a start */
     int sweeps;            /* of a round */
     double first_barrier;  /* strength in the first round. A weak one lets triangles pass each other */

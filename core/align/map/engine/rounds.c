@@ -78,7 +78,7 @@ orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier,
     if (*flips) {
       memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
       ORB_GO(status, orb_map_level_untangle(c->ctx, l, flips, &c->work), done);
-      if (*flips && *flips <= l->triangle_count / params->clear.hopeless) {
+      if (*flips && *flips <= l->triangle_count / (c->given_target ? params->clear.hopeless : params->clear.unfold)) {
         ORB_GO(status, orb_map_level_unfold(c->ctx, l, flips), done);
       }
       if (*flips) {
