@@ -11,8 +11,8 @@
 ORB_MUST_CHECK orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *level, int32_t *left);
 
 /* Sets the marked vertices of a level without flips anew: collapses them onto what surrounds them, and lets them come
- * back inside their kernels, near the middles of their rings. Vertices beside them make room. Pinned vertices stay. Only
- * x changes, and nothing where doubles have no room. O(n + size of the marked parts). */
+ * back inside their kernels, near the middles of their rings. Vertices beside them make room. Pinned vertices stay.
+ * Only x changes, and nothing where doubles have no room. O(n + size of the marked parts). */
 ORB_MUST_CHECK orb_status orb_map_level_set_anew(orb_context *ctx, orb_map_level *level, const unsigned char *mark);
 
 #endif
