@@ -182,7 +182,7 @@ static void next_free(orb_context *ctx, next_match *next) {
 
 /* Composes two shapes towards the next best match, unless the best one has led to a good map, or the next one is far
  * behind. Its first start is compared with that of the best match, which had the same effort; started: the energy after
- * that. Unless it comes near, nothing more is tried. */
+ * that. Where it has ORB_FIND_OTHER_STARTED times as much, nothing more is tried. */
 static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                             const orb_align_options *options, double energy, double started, next_match *next) {
   orb_align_options rotated = *options;

@@ -57,15 +57,10 @@ static void hold_others(ironing *w, int hold) {
 
 /* Restores the parts that have not gained. */
 static void restore(ironing *w, const orb_map_copy *copy) {
-  orb_map_level *l = w->l;
-  const size_t n = 3 * (size_t)l->count;
-  for (int32_t v = 0; v < l->count; v++) {
+  for (int32_t v = 0; v < w->l->count; v++) {
     const int32_t part = w->part[v];
     if (part >= 0 && !(w->after[part] < w->before[part])) {
-      l->place[v] = copy->place[v];
-      for (size_t block = 0; block < 3; block++) { /* y, n and x */
-        memcpy(l->y + block * n + 3 * (size_t)v, copy->y + block * n + 3 * (size_t)v, sizeof(double[3]));
-      }
+      orb_map_copy_restore_vertex(copy, w->l, v);
     }
   }
 }

@@ -110,6 +110,14 @@ void orb_map_copy_restore(const orb_map_copy *s, orb_map_level *l) {
   memcpy(l->y, s->y, 9 * (size_t)l->count * sizeof *s->y);
 }
 
+void orb_map_copy_restore_vertex(const orb_map_copy *s, orb_map_level *l, int32_t v) {
+  const size_t n = 3 * (size_t)l->count, at = 3 * (size_t)v;
+  l->place[v] = s->place[v];
+  for (size_t block = 0; block < 3; block++) { /* y, n and x */
+    memcpy(l->y + block * n + at, s->y + block * n + at, sizeof(double[3]));
+  }
+}
+
 void orb_map_copy_free(orb_map_run *c, orb_map_copy *s) {
   orb_free(c->ctx, s->place);
   orb_free(c->ctx, s->y);

@@ -23,6 +23,8 @@ typedef struct orb_map_copy {
 ORB_MUST_CHECK orb_status orb_map_copy_take(orb_map_run *run, const orb_map_level *level, orb_map_copy *out);
 
 void orb_map_copy_restore(const orb_map_copy *copy, orb_map_level *level);
+/* The same for one vertex. */
+void orb_map_copy_restore_vertex(const orb_map_copy *copy, orb_map_level *level, int32_t v);
 
 void orb_map_copy_free(orb_map_run *run, orb_map_copy *copy);
 

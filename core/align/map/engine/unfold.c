@@ -391,66 +391,74 @@ static void unfolding_free(unfolding *u) {
   orb_free(u->ctx, u->spoke);
 }
 
-orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *l, int32_t *left) {
-  unfolding u = {.ctx = ctx, .l = l};
-  size_t size = 3 * (size_t)l->count * sizeof(double);
-  double *before = ORB_NEW(ctx, double, 3 * (size_t)l->count);
-  int all = 0;
-  orb_status status = before ? ORB_OK : ORB_E_NO_MEMORY;
-  *left = u.flips = orb_map_level_flips(l);
-  if (status != ORB_OK || !*left) {
-    goto done;
-  }
-  memcpy(before, l->x, size);
-  u.home = before;
-  ORB_GO(status, build(&u), done);
-  for (int32_t t = 0; t < l->triangle_count; t++) {
-    const int32_t *v = u.triangle + 3 * (size_t)t;
-    for (int k = 0; k < 3 && is_flipped(&u, v[0], v[1], v[2]); k++) {
-      ask(&u, v[k]);
+/* Collapses what is flipped. */
+static void collapse_flips(unfolding *u) {
+  for (int32_t t = 0; t < u->l->triangle_count; t++) {
+    const int32_t *v = u->triangle + 3 * (size_t)t;
+    for (int k = 0; k < 3 && is_flipped(u, v[0], v[1], v[2]); k++) {
+      ask(u, v[k]);
     }
   }
-  collapse_all(&u);
-  if (u.flips == 0) {
-    ORB_GO(status, bring_back(&u, &all), done);
+  collapse_all(u);
+}
+
+/* Collapses what is marked. */
+static void collapse_marked(unfolding *u, const unsigned char *mark) {
+  for (int any = 1; any;) {
+    any = 0;
+    for (int32_t v = 0; v < u->l->count; v++) {
+      any |= mark[v] && try_vertex(u, v, THIN);
+    }
+    while (u->queue_count > 0) {
+      u->queued[u->queue[--u->queue_count]] = 0;
+    }
   }
-  if (all) {
-    *left = 0;
+}
+
+/* Collapses what is marked, or what is flipped where mark is NULL, and brings it back. *all 0: that cannot be done, and
+ * nothing has changed. */
+static orb_status run(unfolding *u, const unsigned char *mark, int *all) {
+  const size_t size = 3 * (size_t)u->l->count * sizeof(double);
+  double *before = ORB_NEW(u->ctx, double, 3 * (size_t)u->l->count);
+  orb_status status = before ? ORB_OK : ORB_E_NO_MEMORY;
+  *all = 0;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  memcpy(before, u->l->x, size);
+  u->home = mark ? NULL : before;
+  ORB_GO(status, build(u), done);
+  if (mark) {
+    collapse_marked(u, mark);
   } else {
-    memcpy(l->x, before, size);
+    collapse_flips(u);
+  }
+  if (u->flips == 0) {
+    ORB_GO(status, bring_back(u, all), done);
+  }
+  if (!*all) {
+    memcpy(u->l->x, before, size);
   }
 done:
-  orb_free(ctx, before);
-  unfolding_free(&u);
+  orb_free(u->ctx, before);
+  unfolding_free(u);
   return status;
+}
+
+orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *l, int32_t *left) {
+  unfolding u = {.ctx = ctx, .l = l, .flips = orb_map_level_flips(l)};
+  int all;
+  *left = u.flips;
+  if (*left == 0) {
+    return ORB_OK;
+  }
+  ORB_TRY(run(&u, NULL, &all));
+  *left = all ? 0 : *left;
+  return ORB_OK;
 }
 
 orb_status orb_map_level_set_anew(orb_context *ctx, orb_map_level *l, const unsigned char *mark) {
   unfolding u = {.ctx = ctx, .l = l};
-  size_t size = 3 * (size_t)l->count * sizeof(double);
-  double *before = ORB_NEW(ctx, double, 3 * (size_t)l->count);
-  int all = 0, any = 1;
-  orb_status status = before ? ORB_OK : ORB_E_NO_MEMORY;
-  if (status != ORB_OK) {
-    goto done;
-  }
-  memcpy(before, l->x, size);
-  ORB_GO(status, build(&u), done);
-  while (any) {
-    any = 0;
-    for (int32_t v = 0; v < l->count; v++) {
-      any |= mark[v] && try_vertex(&u, v, THIN);
-    }
-    while (u.queue_count > 0) {
-      u.queued[u.queue[--u.queue_count]] = 0;
-    }
-  }
-  ORB_GO(status, bring_back(&u, &all), done);
-  if (!all) {
-    memcpy(l->x, before, size);
-  }
-done:
-  orb_free(ctx, before);
-  unfolding_free(&u);
-  return status;
+  int all; /* else the level stays as it is, which is right too */
+  return run(&u, mark, &all);
 }
