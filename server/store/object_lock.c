@@ -63,12 +63,13 @@ static int holds_any(object_lock *l) {
   return holds;
 }
 
-/* Waits for what nodes announced that have lost the lock since. 0: the database is unreachable. */
+/* Waits for what nodes announced that have lost the lock since. An announcement stands through its last millisecond.
+ * 0: the database is unreachable. */
 static int wait_for_deletions(object_lock *l) {
   enum { LOOK_MS = 500 };
   for (int64_t left = 1; left > 0;) {
     sql_statement *st =
-        database_statement(&l->db, "SELECT coalesce(max(until)-clock_ms(), 0) FROM deletion WHERE until>=clock_ms()");
+        database_statement(&l->db, "SELECT coalesce(max(until)+1-clock_ms(), 0) FROM deletion WHERE until>=clock_ms()");
     if (!st || sql_step(st) != SQL_ROW) {
       sql_reset(st);
       return 0;
