@@ -153,20 +153,6 @@ end:
   return status;
 }
 
-/* Walks to the match of two shapes from their rotations. */
-static orb_status align_walks(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                              const orb_align_options *options, orb_alignment *out) {
-  orb_align_options rotated = *options;
-  rotated.preset = ORB_PRESET_FAST;
-  ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, out));
-  const orb_aims aims = {.targets = m->targets, .keep_angles = m->keep_angles};
-  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_WALKS, &aims, options->preset);
-  if (status != ORB_OK) {
-    orb_alignment_free(ctx, out);
-  }
-  return status;
-}
-
 /* The next best match of two shapes, with its map. */
 typedef struct next_match {
   int is_open;
@@ -181,10 +167,9 @@ static void next_free(orb_context *ctx, next_match *next) {
 }
 
 /* Composes two shapes towards the next best match, unless the best one has led to a good map, or the next one is far
- * behind. Its first start is compared with that of the best match, which had the same effort; started: the energy after
- * that. Where it has ORB_FIND_OTHER_STARTED times as much, nothing more is tried. */
+ * behind. Its first start is compared with that of the best match, which had the same effort. */
 static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                            const orb_align_options *options, double energy, double started, next_match *next) {
+                            const orb_align_options *options, double energy, orb_map_first first, next_match *next) {
   orb_align_options rotated = *options;
   rotated.preset = ORB_PRESET_FAST;
   if (m->shape_count != 2 || m->of[1].other_count == 0 || !(energy > ORB_FIND_OTHER_ABOVE) ||
@@ -195,7 +180,10 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
   ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, &next->alignment));
   next->is_open = 1;
   const double *const targets[2] = {NULL, next->target};
-  const orb_aims aims = {.targets = targets, .keep_angles = m->keep_angles, .beat = ORB_FIND_OTHER_STARTED * started};
+  const orb_aims aims = {.targets = targets,
+                         .keep_angles = m->keep_angles,
+                         .beat = (first.is_walked ? ORB_FIND_OTHER_GAIN : ORB_FIND_OTHER_STARTED) * first.energy,
+                         .walks_first = first.is_walked || m->bend * m->of[1].other[0].cost > ORB_FIND_WALKS_FIRST};
   return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, &aims, options->preset);
 }
 
@@ -220,16 +208,11 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
   return ORB_OK;
 }
 
-/* What leads on where a match has led to no good map: its targets guide walks, which are quick, and where these lead to
- * none either, its pairs are pinned. */
-static orb_status improve_poor(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                               const orb_align_options *options, orb_alignment *alignment) {
+/* Where a match has led to no map, its pairs are pinned. */
+static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
+                           const orb_align_options *options, orb_alignment *alignment) {
   orb_alignment other;
   int held;
-  if (m->shape_count == 2 && m->are_found && alignment->energy > ORB_FIND_WALKS_ABOVE) {
-    ORB_TRY(align_walks(ctx, shapes, m, options, &other));
-    keep_better(ctx, alignment, &other);
-  }
   if (m->count < LEAST_PAIRS || alignment->energy <= ORB_FIND_PINS_ABOVE) {
     return ORB_OK;
   }
@@ -247,14 +230,19 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   const double poor = orb_map_params_of(options->preset).energy.poor;
   next_match next = {0};
   orb_status status;
-  double started = INFINITY;
-  const orb_aims aims = {.targets = m->targets, .keep_angles = m->keep_angles, .started = &started};
+  orb_map_first first = {.energy = INFINITY};
+  const orb_aims aims = {.targets = m->targets,
+                         .keep_angles = m->keep_angles,
+                         .first = &first,
+                         .walks_first = m->bend > ORB_FIND_WALKS_FIRST};
   ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? &aims : NULL, options->preset));
-  ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, started, &next), end);
+  ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, first, &next), end);
   if (next.is_open && next.alignment.energy <= poor) {
     ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
   }
-  ORB_GO(status, improve_poor(ctx, shapes, m, options, alignment), end);
+  if (!first.is_walked) {
+    ORB_GO(status, pin_poor(ctx, shapes, m, options, alignment), end);
+  }
   status = next_take(ctx, m, poor, &next, alignment);
 end:
   next_free(ctx, &next);

@@ -65,10 +65,11 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
                                  .target = aims->targets ? aims->targets[s] : NULL,
                                  .keeps_angles = aims->keep_angles,
                                  .beat = aims->beat,
-                                 .started = aims->started};
+                                 .first = aims->first,
+                                 .walks_first = aims->walks_first};
     double energy[2];
     int improved;
-    int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || from == ORB_MAP_FROM_WALKS);
+    int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || aims->targets);
     ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, &guide,
                         preset, energy, &improved));
     sum += energy[1];

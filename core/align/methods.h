@@ -41,7 +41,8 @@ typedef struct orb_aims {
   const double *const *targets; /* NULL, or for each shape but the first what orb_compose() takes */
   int keep_angles;              /* the spheres of the shapes do */
   double beat;                  /* as in orb_map_guide */
-  double *started;              /* likewise; of the last shape */
+  orb_map_first *first;         /* likewise; of the last shape */
+  int walks_first;              /* likewise */
 } orb_aims;
 
 /* Improves the maps from the first shape to the others (orb_compose()), since aligned landmarks alone do not make a

@@ -58,7 +58,7 @@ static void dog_to_giraffe(void **state) {
   assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
   const double *targets[2] = {NULL, match.target};
   const orb_aims aims = {.targets = targets, .keep_angles = 1};
-  assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_WALKS, &aims, ORB_PRESET_DEFAULT), ORB_OK);
+  assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_SPACE, &aims, ORB_PRESET_DEFAULT), ORB_OK);
   assert_true(alignment.energy <= orb_map_params_of(ORB_PRESET_DEFAULT).energy.poor);
   check_alignment(&alignment, 0);
   orb_alignment_free(ctx, &alignment);

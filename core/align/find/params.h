@@ -38,12 +38,15 @@ static const double ORB_FIND_BEHIND = 2;
 static const double ORB_FIND_OTHER_ABOVE = 1.2, ORB_FIND_OTHER_BEHIND = 4, ORB_FIND_OTHER_GAIN = 0.95;
 /* A first start towards the next best match is followed if it has less than this many times the energy of that of the
  * best one. How much a first start crumples is close to chance: towards the right match of dan-neutral and dan-twist it
- * has 0.7 to 1.9 times the energy of the wrong one, by the last bits of the sums. */
+ * has 0.7 to 1.9 times the energy of the wrong one, by the last bits of the sums. Walks do not crumple: where one led
+ * to the best match, one towards the next is followed from ORB_FIND_OTHER_GAIN. */
 static const double ORB_FIND_OTHER_STARTED = 2;
-/* The energies of the map of a match above which walks are tried, and pinned pairs. Maps of two people in other poses
- * have up to 1.5, and walks led to 0.1 to 0.5 more. Of the three such pairs on which pinned pairs were seen, they led
- * to 1.9, 2.2 and 4.4 in 10 s, where starts now lead to 1.2. */
-static const double ORB_FIND_WALKS_ABOVE = 1.6, ORB_FIND_PINS_ABOVE = 2.5;
+/* What a match bends the shapes, above which walks are tried before the start from its targets. Of 70 pairs, people in
+ * poses bend by 0.02 to 0.15, and the start leads to the better map; other shapes by 0.2 to 0.5, and a walk does. */
+static const double ORB_FIND_WALKS_FIRST = 0.2;
+/* The energy of the map of a match above which its pairs are pinned, unless a walk led to it. Of the three such pairs
+ * on which pinned pairs were seen, they led to 1.9, 2.2 and 4.4 in 10 s, where starts now lead to 1.2. */
+static const double ORB_FIND_PINS_ABOVE = 2.5;
 /* The energy of rotated spheres up to which the shapes are alike, as balls with small features are, and keep their
  * given spheres. Rotated spheres of people in poses have 4 and more. */
 static const double ORB_FIND_ALIKE = 2;

@@ -262,7 +262,7 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
     return orb_map_run_start(c, ORB_MAP_GIVEN);
   }
   if (c->given_target) {
-    return from == ORB_MAP_FROM_WALKS ? orb_map_walk_to_targets(c) : orb_map_follow_targets(c);
+    return orb_map_follow_targets(c);
   }
   if (from == ORB_MAP_FROM_WALK) {
     return run_walk(c);
@@ -347,7 +347,8 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
                    .given_target = guide->target,
                    .keeps_angles = guide->keeps_angles,
                    .beat = guide->beat,
-                   .started = guide->started,
+                   .first = guide->first,
+                   .walks_first = guide->walks_first && both,
                    .springs = guide->springs,
                    .hopeless = INFINITY,
                    .twisted_energy = INFINITY};

@@ -48,17 +48,17 @@ static orb_status start_coarser(orb_map_run *c) {
   return status;
 }
 
-/* From walks that the targets guide. */
+/* From walks that the targets guide: the best of them is refined if it comes below the best map so far, and below what
+ * the caller knows. */
 static orb_status start_guided(orb_map_run *c) {
   orb_map_walked best = {.energy = INFINITY};
   orb_status status;
-  ORB_GO(status, orb_map_register(c, 0), done);
   ORB_GO(status, orb_map_walked_improve(c, &best), done);
-  if (best.energy < INFINITY) {
+  if (best.energy < c->best_energy && !(c->beat > 0 && best.energy >= c->beat)) {
     allow(c);
     ORB_GO(status, orb_map_walked_refine(c, &best), done);
-    ORB_GO(status, orb_map_levels_prepare(c), done);
   }
+  status = orb_map_levels_prepare(c);
 done:
   orb_map_walked_free(c, &best);
   return status;
@@ -74,14 +74,27 @@ static orb_status run_passes(orb_map_run *c) {
   return orb_map_run_passes(c, 0);
 }
 
-/* The first start. */
-static orb_status run_first(orb_map_run *c) {
+/* The first start, and walks where that leads to no map of shapes that correspond. *walked: a walk leads to the best
+ * map. */
+static orb_status run_first(orb_map_run *c, int *walked) {
+  const double given = c->best_energy;
   ORB_TRY(orb_map_register(c, 0));
   ORB_TRY(orb_map_levels_prepare(c));
-  ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
+  if (c->walks_first) {
+    ORB_TRY(start_guided(c));
+  }
+  *walked = c->best_energy < given;
+  if (!*walked && !(c->walks_first && c->beat > 0)) {
+    ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
+  }
+  const double started = c->best_energy;
+  if (c->both && !c->walks_first && started > c->params.targets.walked) {
+    ORB_TRY(start_guided(c));
+    *walked = c->best_energy < started;
+  }
   c->is_beaten = c->beat > 0 && !(c->best_energy < c->beat);
-  if (c->started) {
-    *c->started = c->best_energy;
+  if (c->first) {
+    *c->first = (orb_map_first){c->best_energy, *walked};
   }
   return ORB_OK;
 }
@@ -104,9 +117,13 @@ static orb_status run_starts(orb_map_run *c) {
 
 orb_status orb_map_follow_targets(orb_map_run *c) {
   const orb_map_params *p = &c->params;
-  ORB_TRY(run_first(c));
+  int walked;
+  ORB_TRY(run_first(c, &walked));
   if (c->is_beaten) {
     return ORB_OK;
+  }
+  if (walked) {
+    return c->best_energy > good_energy(c) && c->best_energy <= p->energy.poor ? run_passes(c) : ORB_OK;
   }
   ORB_TRY(run_starts(c));
   double started = c->best_energy;
@@ -127,10 +144,4 @@ orb_status orb_map_follow_targets(orb_map_run *c) {
     ORB_TRY(run_passes(c));
   }
   return ORB_OK;
-}
-
-orb_status orb_map_walk_to_targets(orb_map_run *c) {
-  const orb_map_params *p = &c->params;
-  ORB_TRY(start_guided(c));
-  return c->best_energy > good_energy(c) && c->best_energy <= p->energy.poor ? run_passes(c) : ORB_OK;
 }

@@ -8,7 +8,4 @@
  * shapes that correspond (energy above params.energy.poor): it has other ways. */
 ORB_MUST_CHECK orb_status orb_map_follow_targets(orb_map_run *run);
 
-/* The same by landmark walks that samples of run->given_target guide. Changes the fixed shape's sphere. */
-ORB_MUST_CHECK orb_status orb_map_walk_to_targets(orb_map_run *run);
-
 #endif

@@ -100,10 +100,13 @@ done:
 orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
   const orb_map_params *p = &c->params;
   const int64_t work = p->walked.work * (int64_t)c->vertex_count;
-  for (int i = 0; i < ORB_MAP_GUIDED && best->energy > p->walked.enough; i++) {
+  const int most = c->beat > 0 ? p->walked.beat_most : ORB_MAP_GUIDED;
+  int agree = 0;
+  for (int i = 0; i < most && best->energy > p->walked.enough && !agree; i++) {
     orb_map_walked w;
     c->work = c->work > work ? c->work : work;
     orb_status status = orb_map_walked_create(c, p->walked.guides[i], &w);
+    agree = w.energy < INFINITY && fabs(w.energy - best->energy) <= p->walked.agree * w.energy;
     if (status == ORB_OK && w.energy < best->energy) {
       orb_map_walked worse = *best;
       *best = w;

@@ -11,7 +11,6 @@ typedef enum orb_map_from {
   ORB_MAP_FROM_SPACE, /* what fits best in space */
   ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
   ORB_MAP_FROM_WALK,  /* none: a landmark walk alone, which is quick. Needs `both` */
-  ORB_MAP_FROM_WALKS, /* none: samples of the given targets guide landmark walks. Needs `both` */
   ORB_MAP_FROM_NEAR,  /* none: the map as given takes the landmarks near their partners, and they are moved there */
   ORB_MAP_FROM_PINS,  /* none: the map as given is only let go where it was pinned. For springs */
   ORB_MAP_FROM_COPY   /* none: a decimated copy of the moving shape has its map already. The map as given is not used */
@@ -32,6 +31,12 @@ typedef struct orb_map_level_map {
   orb_hierarchy **hierarchy; /* of the moving shape; one level of it has these vertices. It is taken over */
 } orb_map_level_map;
 
+/* What the first start towards a target has led to. */
+typedef struct orb_map_first {
+  double energy;
+  int is_walked; /* by a landmark walk */
+} orb_map_first;
+
 /* What guides a composed map. */
 typedef struct orb_map_guide {
   orb_map_from from;
@@ -41,7 +46,9 @@ typedef struct orb_map_guide {
                            the targets are smoothed */
   double beat;          /* with a target: unless the first start has less energy than this, it is the last. 0: it never
                            is */
-  double *started;      /* with a target: NULL, or set to the energy after the first start */
+  orb_map_first *first; /* with a target: NULL, or set */
+  int walks_first;      /* with a target and `both`: a walk is tried before the start from the targets, and in its place
+                           where it leads to a map */
   orb_map_springs springs; /* with ORB_MAP_FROM_PINS and ORB_MAP_FROM_COPY */
   orb_map_level_map copy;  /* with ORB_MAP_FROM_COPY */
 } orb_map_guide;

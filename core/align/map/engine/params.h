@@ -96,6 +96,8 @@ typedef struct orb_map_params {
     double hopeless; /* energy of a start above which nothing else is tried */
     double alike;    /* energy up to which a map is good on spheres that keep areas: these shapes are alike, or agree in
                         their landmarks' distances, so less is within reach than energy.good */
+    double walked;   /* energy of the first start above which walks are tried. Maps of two people in other poses have
+                        up to 1.5, and walks led to 0.1 to 0.5 more */
     double crumpled; /* energy of the first start up to which it is drawn at once */
     double drawn;    /* above which the map is not drawn: it stays caught */
     double gain;     /* a draw below this share of the energy before it opens the way for one more pass, */
@@ -120,6 +122,9 @@ typedef struct orb_map_params {
                         shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
                         walk get stuck, and which is best is close to chance */
     double enough;                  /* energy of a coarse map up to which no further walk is tried */
+    int beat_most;                  /* most walks where run->beat is known */
+    double agree;                   /* relative difference of two such energies up to which none is: both walks came to
+                                       one basin */
   } walked;
 
   /* Sweeps over a level. */

@@ -51,7 +51,8 @@ typedef struct orb_map_run {
   double *x, *normal;         /* moving shape, area 4π */
   int keeps_angles;           /* see orb_map_guide */
   double beat;                /* likewise */
-  double *started;            /* likewise */
+  orb_map_first *first;       /* likewise */
+  int walks_first;            /* likewise */
   int is_beaten;              /* the first start was the last */
   const double *given_target; /* for registrations without samples, in the fixed shape's space; NULL: computed */
   int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
