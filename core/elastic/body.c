@@ -4,12 +4,8 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "numeric/clones.h"
 #include "numeric/vec3.h"
 
-enum { BLOCK = 64, LANES = 16 }; /* vertices that are measured at once; and minima that are kept side by side */
-
-static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|² against |x − x'|², areas being 4π */
 /* Half cotangents. Below 0 the energy has no minimum; far above 1 the triangle is a sliver of the decimation. */
 static const double LEAST_WEIGHT = 0.05, MOST_WEIGHT = 5;
 
@@ -35,64 +31,6 @@ void orb_body_normals(const orb_mesh *m, const double *x, double *normal, double
   for (int32_t v = 0; v < m->vertex_count; v++) {
     (void)orb_normalize(normal + 3 * (size_t)v);
   }
-}
-
-orb_status orb_searched_create(orb_context *ctx, int32_t count, orb_searched *out) {
-  out->columns = (count + BLOCK - 1) / BLOCK * BLOCK;
-  out->at = ORB_NEW(ctx, float, 6 * (size_t)out->columns);
-  return out->at ? ORB_OK : ORB_E_NO_MEMORY;
-}
-
-void orb_searched_fill(const double *position, const double *normal, int32_t count, orb_searched *out) {
-  const double weight = sqrt(NORMAL_WEIGHT);
-  for (int k = 0; k < 6; k++) {
-    const double *from = k < 3 ? position : normal, factor = k < 3 ? 1 : weight;
-    float *column = out->at + (size_t)k * (size_t)out->columns;
-    for (int32_t i = 0; i < out->columns; i++) {
-      column[i] = i < count ? (float)(factor * from[3 * (size_t)i + (size_t)(k % 3)]) : INFINITY;
-    }
-  }
-}
-
-/* Squared distances in position and normal of BLOCK vertices; returns the least. */
-ORB_CLONES static float measure_block(const float *at, int32_t columns, const float q[6], float *out) {
-  float lane[LANES];
-  for (int i = 0; i < BLOCK; i++) {
-    float sum = 0;
-    for (int k = 0; k < 6; k++) {
-      float d = at[k * (ptrdiff_t)columns + i] - q[k];
-      sum += d * d;
-    }
-    out[i] = sum;
-  }
-  memcpy(lane, out, sizeof lane);
-  for (int i = LANES; i < BLOCK; i += LANES) {
-    for (int k = 0; k < LANES; k++) {
-      lane[k] = out[i + k] < lane[k] ? out[i + k] : lane[k];
-    }
-  }
-  float least = lane[0];
-  for (int k = 1; k < LANES; k++) {
-    least = lane[k] < least ? lane[k] : least;
-  }
-  return least;
-}
-
-int32_t orb_searched_nearest(const orb_searched *s, const double x[3], const double n[3]) {
-  const float weight = (float)sqrt(NORMAL_WEIGHT);
-  const float q[6] = {(float)x[0],          (float)x[1],          (float)x[2],
-                      weight * (float)n[0], weight * (float)n[1], weight * (float)n[2]};
-  float least = INFINITY, block[BLOCK];
-  int32_t best = 0;
-  for (int32_t first = 0; first < s->columns; first += BLOCK) {
-    if (measure_block(s->at + first, s->columns, q, block) < least) {
-      for (int i = 0; i < BLOCK; i++) {
-        best = block[i] < least ? first + i : best;
-        least = block[i] < least ? block[i] : least;
-      }
-    }
-  }
-  return best;
 }
 
 /* Half the cotangent at the corner opposite to the half-edge h. */
@@ -138,14 +76,17 @@ orb_status orb_body_create(orb_context *ctx, const orb_mesh *mesh, orb_body *out
   out->next = ORB_NEW(ctx, int32_t, 2 * h);
   out->weight = ORB_NEW(ctx, double, 2 * h);
   int32_t *filled = ORB_NEW0(ctx, int32_t, n);
-  orb_status status = orb_searched_create(ctx, out->count, &out->searched);
+  orb_status status = ORB_OK;
   if (!out->normal || !out->mass || !out->start || !out->next || !out->weight || !filled) {
     status = ORB_E_NO_MEMORY;
   }
   if (status == ORB_OK) {
     orb_body_normals(mesh, mesh->positions, out->normal, out->mass);
-    orb_searched_fill(mesh->positions, out->normal, out->count, &out->searched);
     list_edges(out, filled);
+    status = orb_searched_create(ctx, mesh->positions, out->normal, out->count, &out->searched);
+  }
+  if (status == ORB_OK) {
+    orb_searched_fill(mesh->positions, out->normal, &out->searched);
   }
   orb_free(ctx, filled);
   return status;
@@ -154,7 +95,7 @@ orb_status orb_body_create(orb_context *ctx, const orb_mesh *mesh, orb_body *out
 void orb_body_free(orb_context *ctx, orb_body *b) {
   orb_free(ctx, b->normal);
   orb_free(ctx, b->mass);
-  orb_free(ctx, b->searched.at);
+  orb_searched_free(ctx, &b->searched);
   orb_free(ctx, b->start);
   orb_free(ctx, b->next);
   orb_free(ctx, b->weight);

@@ -2,13 +2,7 @@
 #ifndef ORB_ELASTIC_BODY_H
 #define ORB_ELASTIC_BODY_H
 
-#include "orbmorph/mesh.h"
-
-/* Positions and weighted normals laid out for searches: six columns of floats. */
-typedef struct orb_searched {
-  int32_t columns; /* a multiple of a search's block; the last ones lie at infinity */
-  float *at;
-} orb_searched;
+#include "elastic/searched.h"
 
 typedef struct orb_body {
   const orb_mesh *mesh; /* borrowed */
@@ -27,12 +21,5 @@ void orb_body_free(orb_context *ctx, orb_body *body);
 
 /* Unit normals of the mesh at these positions (3 a vertex). mass may be NULL. */
 void orb_body_normals(const orb_mesh *mesh, const double *position, double *normal, double *mass);
-
-/* Room for `count` vertices; and the layout of their positions and normals. */
-ORB_MUST_CHECK orb_status orb_searched_create(orb_context *ctx, int32_t count, orb_searched *out);
-void orb_searched_fill(const double *position, const double *normal, int32_t count, orb_searched *out);
-
-/* The vertex nearest in position and half-weighted normal. O(n), by vectors. */
-int32_t orb_searched_nearest(const orb_searched *searched, const double position[3], const double normal[3]);
 
 #endif

@@ -183,7 +183,7 @@ static void pull_by_place(registration *r, double weight) {
   const double *position = r->pose->position;
   double target[3];
   orb_body_normals(r->a.mesh, position, r->normal, NULL);
-  orb_searched_fill(position, r->normal, r->a.count, &r->searched);
+  orb_searched_fill(position, r->normal, &r->searched);
   for_vertices(r, r->a.count, find_places);
   for_vertices(r, r->b.count, find_visits);
   for (int32_t v = 0; v < r->a.count; v++) {
@@ -310,7 +310,7 @@ static void registration_free(registration *r) {
   orb_body_free(r->ctx, &r->a);
   orb_body_free(r->ctx, &r->b);
   orb_free(r->ctx, r->normal);
-  orb_free(r->ctx, r->searched.at);
+  orb_searched_free(r->ctx, &r->searched);
   orb_free(r->ctx, r->diagonal);
   orb_free(r->ctx, r->right);
   orb_free(r->ctx, r->pull);
@@ -342,7 +342,7 @@ static orb_status registration_create(orb_context *ctx, const orb_mesh *a, const
   size_t n = (size_t)a->vertex_count;
   ORB_TRY(orb_body_create(ctx, a, &r->a));
   ORB_TRY(orb_body_create(ctx, b, &r->b));
-  ORB_TRY(orb_searched_create(ctx, a->vertex_count, &r->searched));
+  ORB_TRY(orb_searched_create(ctx, a->positions, r->a.normal, a->vertex_count, &r->searched));
   r->normal = ORB_NEW(ctx, double, 3 * n);
   r->diagonal = ORB_NEW(ctx, double, n);
   r->right = ORB_NEW(ctx, double, 3 * n);

@@ -5,8 +5,9 @@
  * right limbs bends little, even if it misses their tips by a little. A map of the wrong limbs bends much. So the cost
  * ranks maps. Read in this order:
  *
- *   body.h     a mesh with what the steps read
- *   elastic.h  the registration
+ *   searched.h  vertices, laid out for searches of the nearest one
+ *   body.h      a mesh with what the steps read
+ *   elastic.h   the registration
  *
  * Source: Sorkine & Alexa 2007 (as-rigid-as-possible energy: rotations of vertices and positions take turns), with
  * iterative closest points (Besl & McKay 1992) in both directions.

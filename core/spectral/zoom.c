@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "numeric/clones.h"
 #include "numeric/dense.h"
 
 /* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half choose). */
@@ -27,7 +28,8 @@ enum {
   S = ORB_SPECTRAL_SAMPLES,
   K = ORB_SPECTRAL_FUNCTIONS,
   COORDINATES = K + ORB_SPECTRAL_TRIPLES,
-  POLAR = 10 /* most steps to the nearest orthogonal matrix */
+  POLAR = 10,      /* most steps to the nearest orthogonal matrix */
+  IMAGE_BLOCK = 64 /* vertices that an image is compared with at once */
 };
 
 /* Samples of a, brought to b, and samples of b: one is nearest to another by their products. */
@@ -339,26 +341,48 @@ int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t s
   return orb_zoom_vertex_image(pair, map, pair->shape[back ? 1 : 0]->sample[sample], back);
 }
 
+/* Adds the squared differences of one function to those of IMAGE_BLOCK vertices. */
+ORB_CLONES static void add_squares(const double *function, double value, double *restrict sum) {
+  for (int i = 0; i < IMAGE_BLOCK; i++) {
+    const double d = value - function[i];
+    sum[i] += d * d;
+  }
+}
+
+/* The vertices [begin, end) of one block; the nearest one so far. */
+static void look_at_block(const orb_spectral_shape *to, const double *point, int size, size_t begin, size_t end,
+                          double *least, int32_t *nearest) {
+  const size_t n = (size_t)to->mesh->vertex_count;
+  double sum[IMAGE_BLOCK] = {0};
+  for (int k = 0; k < size; k++) {
+    const double *function = to->function + (size_t)k * n + begin;
+    if (end - begin == IMAGE_BLOCK) {
+      add_squares(function, point[k], sum);
+    } else {
+      for (size_t i = 0; i < end - begin; i++) {
+        const double d = point[k] - function[i];
+        sum[i] += d * d;
+      }
+    }
+  }
+  for (size_t i = 0; i < end - begin; i++) {
+    *nearest = sum[i] < *least ? (int32_t)(begin + i) : *nearest;
+    *least = sum[i] < *least ? sum[i] : *least;
+  }
+}
+
 int32_t orb_zoom_vertex_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t vertex, int back) {
   const orb_spectral_shape *from = pair->shape[back ? 1 : 0], *to = pair->shape[back ? 0 : 1];
   size_t n = (size_t)to->mesh->vertex_count, m = (size_t)from->mesh->vertex_count;
-  double point[K] = {0}, best = INFINITY;
+  double point[K] = {0}, least = INFINITY;
   int32_t nearest = 0;
   for (int i = 0; i < map->size; i++) {
     for (int k = 0; k < map->size; k++) {
       point[i] += (back ? map->matrix[k][i] : map->matrix[i][k]) * from->function[(size_t)k * m + (size_t)vertex];
     }
   }
-  for (size_t v = 0; v < n; v++) {
-    double sum = 0;
-    for (int k = 0; k < map->size && sum < best; k++) {
-      double d = point[k] - to->function[(size_t)k * n + v];
-      sum += d * d;
-    }
-    if (sum < best) {
-      best = sum;
-      nearest = (int32_t)v;
-    }
+  for (size_t begin = 0; begin < n; begin += IMAGE_BLOCK) {
+    look_at_block(to, point, map->size, begin, begin + IMAGE_BLOCK < n ? begin + IMAGE_BLOCK : n, &least, &nearest);
   }
   return nearest;
 }

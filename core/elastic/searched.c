@@ -1,0 +1,204 @@
+#include "elastic/searched.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "numeric/clones.h"
+
+/* Vertices of a block: two vectors of floats. Boxes of a row: measured at once. */
+enum { BLOCK = 16, ROW = 64, COORDINATES = 6 };
+
+static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|² against |x − x'|², areas being 4π */
+
+/* A vertex with its coordinates. */
+typedef struct point {
+  float at[COORDINATES];
+  int32_t vertex;
+} point;
+
+/* A run of points that is split where it is longer than a block. */
+typedef struct run {
+  int32_t begin, end;
+} run;
+
+static int widest_of(const point *list, int32_t count) {
+  int widest = 0;
+  float width = -1;
+  for (int k = 0; k < COORDINATES; k++) {
+    float least = list[0].at[k], greatest = least;
+    for (int32_t i = 1; i < count; i++) {
+      least = list[i].at[k] < least ? list[i].at[k] : least;
+      greatest = list[i].at[k] > greatest ? list[i].at[k] : greatest;
+    }
+    widest = greatest - least > width ? k : widest;
+    width = greatest - least > width ? greatest - least : width;
+  }
+  return widest;
+}
+
+/* Puts the points that come first by coordinate k before `middle`, the others behind (Hoare 1961). */
+static void part(point *list, int32_t count, int32_t middle, int k) {
+  for (int32_t begin = 0, end = count - 1; begin < end;) {
+    const float pivot = list[begin + (end - begin) / 2].at[k];
+    int32_t i = begin, j = end;
+    while (i <= j) {
+      while (list[i].at[k] < pivot) {
+        i++;
+      }
+      while (list[j].at[k] > pivot) {
+        j--;
+      }
+      if (i <= j) {
+        const point other = list[i];
+        list[i++] = list[j];
+        list[j--] = other;
+      }
+    }
+    begin = middle >= i ? i : begin;
+    end = middle <= j ? j : end;
+    if (middle > j && middle < i) {
+      return;
+    }
+  }
+}
+
+/* Orders points so that each block has near ones: the widest coordinate of a run is halved until the runs are blocks.
+ */
+static void order_points(point *list, int32_t count) {
+  run stack[32] = {{0, count}}; /* the longer half waits, so a run in it has at most half of the one before */
+  for (int depth = 1; depth > 0;) {
+    const run one = stack[--depth];
+    const int32_t length = one.end - one.begin, middle = (length / 2 + BLOCK - 1) / BLOCK * BLOCK;
+    if (length > BLOCK) {
+      part(list + one.begin, length, middle, widest_of(list + one.begin, length));
+      stack[depth++] = (run){one.begin, one.begin + middle};
+      stack[depth++] = (run){one.begin + middle, one.end};
+    }
+  }
+}
+
+static float coordinate_of(const double *position, const double *normal, size_t v, int k) {
+  return (float)(k < 3 ? position[3 * v + (size_t)k] : sqrt(NORMAL_WEIGHT) * normal[3 * v + (size_t)(k - 3)]);
+}
+
+orb_status orb_searched_create(orb_context *ctx, const double *position, const double *normal, int32_t count,
+                               orb_searched *out) {
+  out->count = count;
+  out->columns = (count + BLOCK - 1) / BLOCK * BLOCK;
+  out->boxes = (out->columns / BLOCK + ROW - 1) / ROW * ROW;
+  out->order = ORB_NEW(ctx, int32_t, out->columns);
+  out->at = ORB_NEW(ctx, float, COORDINATES *(size_t)out->columns);
+  out->box = ORB_NEW(ctx, float, 2 * COORDINATES * (size_t)out->boxes);
+  point *list = ORB_NEW(ctx, point, count);
+  const int fine = out->order && out->at && out->box && list;
+  if (fine) {
+    for (int32_t v = 0; v < count; v++) {
+      list[v].vertex = v;
+      for (int k = 0; k < COORDINATES; k++) {
+        list[v].at[k] = coordinate_of(position, normal, (size_t)v, k);
+      }
+    }
+    order_points(list, count);
+    for (int32_t i = 0; i < count; i++) {
+      out->order[i] = list[i].vertex;
+    }
+  }
+  orb_free(ctx, list);
+  return fine ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+void orb_searched_free(orb_context *ctx, orb_searched *s) {
+  orb_free(ctx, s->order);
+  orb_free(ctx, s->at);
+  orb_free(ctx, s->box);
+  memset(s, 0, sizeof *s);
+}
+
+/* The boxes of one coordinate. */
+static void fill_boxes(const float *column, orb_searched *out, int coordinate) {
+  float *least = out->box + (size_t)coordinate * (size_t)out->boxes;
+  float *greatest = least + COORDINATES * (size_t)out->boxes;
+  for (int32_t b = 0; b < out->boxes; b++) {
+    least[b] = greatest[b] = INFINITY;
+    for (int32_t i = b * BLOCK; i < (b + 1) * BLOCK && i < out->count; i++) {
+      const int first = i == b * BLOCK;
+      least[b] = first || column[i] < least[b] ? column[i] : least[b];
+      greatest[b] = first || column[i] > greatest[b] ? column[i] : greatest[b];
+    }
+  }
+}
+
+void orb_searched_fill(const double *position, const double *normal, orb_searched *out) {
+  for (int k = 0; k < COORDINATES; k++) {
+    float *column = out->at + (size_t)k * (size_t)out->columns;
+    for (int32_t i = 0; i < out->columns; i++) {
+      column[i] = i < out->count ? coordinate_of(position, normal, (size_t)out->order[i], k) : INFINITY;
+    }
+    fill_boxes(column, out, k);
+  }
+}
+
+/* Squared distances of the vertices of a block. */
+ORB_CLONES static void measure_block(const float *at, int32_t columns, const float q[COORDINATES], float *out) {
+  float sum[BLOCK] = {0};
+  for (int k = 0; k < COORDINATES; k++) {
+    const float *column = at + k * (ptrdiff_t)columns;
+    for (int i = 0; i < BLOCK; i++) {
+      float d = column[i] - q[k];
+      sum[i] += d * d;
+    }
+  }
+  memcpy(out, sum, sizeof sum);
+}
+
+/* Squared distances of a row of boxes. No vertex of a box is nearer, also by rounded sums: each operation rounds
+ * monotonically, and both add in the same order. */
+ORB_CLONES static void measure_boxes(const float *box, int32_t boxes, const float q[COORDINATES], float *out) {
+  float sum[ROW] = {0};
+  for (int k = 0; k < COORDINATES; k++) {
+    const float *least = box + k * (ptrdiff_t)boxes, *greatest = least + COORDINATES * (ptrdiff_t)boxes;
+    for (int i = 0; i < ROW; i++) {
+      float below = least[i] - q[k], above = q[k] - greatest[i];
+      float d = below > above ? below : above;
+      d = d > 0 ? d : 0;
+      sum[i] += d * d;
+    }
+  }
+  memcpy(out, sum, sizeof sum);
+}
+
+/* Of the vertices of a block, and of the best one before. */
+static void look_at_block(const orb_searched *s, int32_t block, const float q[COORDINATES], float *least,
+                          int32_t *best) {
+  float distance[BLOCK];
+  measure_block(s->at + block * BLOCK, s->columns, q, distance);
+  for (int i = 0; i < BLOCK; i++) {
+    *best = distance[i] < *least ? block * BLOCK + i : *best;
+    *least = distance[i] < *least ? distance[i] : *least;
+  }
+}
+
+int32_t orb_searched_nearest(const orb_searched *s, const double x[3], const double n[3]) {
+  const float weight = (float)sqrt(NORMAL_WEIGHT);
+  const float q[COORDINATES] = {(float)x[0],          (float)x[1],          (float)x[2],
+                                weight * (float)n[0], weight * (float)n[1], weight * (float)n[2]};
+  float least = INFINITY, distance[ROW];
+  int32_t best = 0;
+  for (int32_t row = 0; row < s->boxes; row += ROW) {
+    measure_boxes(s->box + row, s->boxes, q, distance);
+    int32_t first = 0;
+    for (int i = 1; i < ROW; i++) {
+      first = distance[i] < distance[first] ? i : first;
+    }
+    if (distance[first] < least) {
+      look_at_block(s, row + first, q, &least, &best);
+    }
+    for (int i = 0; i < ROW; i++) {
+      if (distance[i] < least && i != first) {
+        look_at_block(s, row + i, q, &least, &best);
+      }
+    }
+  }
+  return s->order[best];
+}
