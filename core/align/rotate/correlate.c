@@ -17,6 +17,7 @@
 #include "base/context.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "numeric/clones.h"
 #include "numeric/vec3.h"
 
 /* Chosen by trial. */
@@ -24,7 +25,8 @@ enum {
   SIDE = 12,       /* cells along an edge of the cube map: 7.5° each, */
   COARSE_SIDE = 6, /* and of the one on which the grid is evaluated: 15°, as the rotations of the grid */
   CELLS = 6 * SIDE * SIDE,
-  FIELD = 6,  /* numbers of a cell: position and normal */
+  NORMAL = 4, /* where the normal of a cell begins, behind its position */
+  FIELD = 8,  /* numbers of a cell: position and normal, each filled up with 0 to a vector */
   AXES = 200, /* poles of the grid of rotations, about 14° apart */
   SPINS = 24, /* rotations around each pole: 15° apart */
   GRID = AXES * SPINS,
@@ -43,7 +45,7 @@ static const double GOLDEN_ANGLE = 2.399963229728653; /* π (3 − √5): betwee
 /* Mean position (centred, unit variance) and normal (variance NORMALS) of each cell of the cube map. */
 typedef struct field {
   int side; /* cells along an edge: at most SIDE */
-  double direction[CELLS][3], weight[CELLS], value[CELLS][FIELD];
+  double direction[3][CELLS], weight[CELLS], value[CELLS][FIELD];
 } field;
 
 static int32_t cell_count(const field *f) {
@@ -99,7 +101,7 @@ static void splat(field *f, const orb_aligned_shape *shape, int32_t t) {
       f->weight[cell] += density;
       for (int k = 0; k < 3; k++) {
         f->value[cell][k] += density * (c * x[0][k] + a * x[1][k] + b * x[2][k]);
-        f->value[cell][3 + k] += density * normal[k];
+        f->value[cell][NORMAL + k] += density * normal[k];
       }
     }
   }
@@ -113,7 +115,11 @@ static void field_make(field *f, int side, const orb_aligned_shape *shape) {
   }
   double mean[3] = {0, 0, 0}, variance = 0, normal_variance = 0, total = 0;
   for (int32_t c = 0; c < cell_count(f); c++) {
-    cell_direction(side, c, f->direction[c]);
+    double direction[3];
+    cell_direction(side, c, direction);
+    for (int k = 0; k < 3; k++) {
+      f->direction[k][c] = direction[k];
+    }
     if (f->weight[c] > 0) {
       for (int k = 0; k < FIELD; k++) {
         f->value[c][k] /= f->weight[c];
@@ -128,7 +134,7 @@ static void field_make(field *f, int side, const orb_aligned_shape *shape) {
     for (int k = 0; k < 3; k++) {
       f->value[c][k] -= mean[k] / total;
       variance += f->weight[c] * f->value[c][k] * f->value[c][k];
-      normal_variance += f->weight[c] * f->value[c][3 + k] * f->value[c][3 + k];
+      normal_variance += f->weight[c] * f->value[c][NORMAL + k] * f->value[c][NORMAL + k];
     }
   }
   double scale = sqrt(total / (variance + ORB_TINY)),
@@ -137,7 +143,7 @@ static void field_make(field *f, int side, const orb_aligned_shape *shape) {
     f->weight[c] /= total;
     for (int k = 0; k < 3; k++) {
       f->value[c][k] *= f->weight[c] > 0 ? scale : 0;
-      f->value[c][3 + k] *= f->weight[c] > 0 ? scale_normal : 0;
+      f->value[c][NORMAL + k] *= f->weight[c] > 0 ? scale_normal : 0;
     }
   }
 }
@@ -172,22 +178,46 @@ static double misfit(const search *s, const double r[9]) {
   return s->marks > 0 ? sum / s->marks : 0;
 }
 
-/* Correlation of a with b rotated on the sphere: *upright without, *best with the best rotation in space. */
-static orb_status score_of(const search *s, const field of[2], const double r[9], double *upright, double *best) {
-  const field *a = &of[0], *b = &of[1];
-  double m[9] = {0};
-  for (int32_t c = 0; c < cell_count(a); c++) {
-    const double *d = a->direction[c];
-    /* what R carries to d lies at Rᵀ d */
-    double q[3] = {r[0] * d[0] + r[3] * d[1] + r[6] * d[2], r[1] * d[0] + r[4] * d[1] + r[7] * d[2],
-                   r[2] * d[0] + r[5] * d[1] + r[8] * d[2]};
-    const double *fa = a->value[c], *fb = b->value[cell_of(b->side, q)];
-    double w = a->weight[c];
+/* cell_of() of all cells, whose directions a rotation of b moves; what R carries to d lies at Rᵀ d. */
+ORB_CLONES static void rotate_cells(const field *a, int side, const double r[9], int32_t *restrict out) {
+  const int count = 6 * a->side * a->side;
+  const double *restrict dx = a->direction[0], *restrict dy = a->direction[1], *restrict dz = a->direction[2];
+  for (int c = 0; c < count; c++) {
+    const double x = r[0] * dx[c] + r[3] * dy[c] + r[6] * dz[c], y = r[1] * dx[c] + r[4] * dy[c] + r[7] * dz[c],
+                 z = r[2] * dx[c] + r[5] * dy[c] + r[8] * dz[c];
+    const int by_x = (fabs(x) >= fabs(y)) & (fabs(x) >= fabs(z)), by_y = !by_x & (fabs(y) >= fabs(z));
+    const double major = by_x ? x : by_y ? y : z, u = by_x ? y : by_y ? z : x, v = by_x ? z : by_y ? x : y;
+    const double inverse = 1 / fabs(major); /* directions have length 1 */
+    int i = (int)((u * inverse + 1) * 0.5 * side), j = (int)((v * inverse + 1) * 0.5 * side);
+    i = i < 0 ? 0 : i < side ? i : side - 1;
+    j = j < 0 ? 0 : j < side ? j : side - 1;
+    out[c] = ((2 * (by_x ? 0 : by_y ? 1 : 2) + (major < 0)) * side + i) * side + j;
+  }
+}
+
+/* Adds up the cross-covariance of the cells of a with those of b beside them. */
+ORB_CLONES static void covary(const field *a, const field *b, const int32_t *cell, double m[3][NORMAL]) {
+  const int count = 6 * a->side * a->side;
+  double sum[3][NORMAL] = {{0}};
+  for (int c = 0; c < count; c++) {
+    const double *restrict fa = a->value[c], *restrict fb = b->value[cell[c]], w = a->weight[c];
     for (int i = 0; i < 3; i++) {
-      for (int j = 0; j < 3; j++) {
-        m[3 * i + j] += w * (fb[i] * fa[j] + fb[3 + i] * fa[3 + j]);
+      for (int j = 0; j < NORMAL; j++) {
+        sum[i][j] += w * (fb[i] * fa[j] + fb[NORMAL + i] * fa[NORMAL + j]);
       }
     }
+  }
+  memcpy(m, sum, sizeof sum);
+}
+
+/* Correlation of a with b rotated on the sphere: *upright without, *best with the best rotation in space. */
+static orb_status score_of(const search *s, const field of[2], const double r[9], double *upright, double *best) {
+  int32_t cell[CELLS];
+  double sum[3][NORMAL], m[9];
+  rotate_cells(&of[0], of[1].side, r, cell);
+  covary(&of[0], &of[1], cell, sum);
+  for (int k = 0; k < 9; k++) {
+    m[k] = sum[k / 3][k % 3];
   }
   double in_space[9], singular[3];
   ORB_TRY(orb_procrustes_covariance(s->ctx, m, in_space, singular));
