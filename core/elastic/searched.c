@@ -6,8 +6,8 @@
 #include "base/memory.h"
 #include "numeric/clones.h"
 
-/* Vertices of a block: two vectors of floats. Boxes of a row: measured at once. */
-enum { BLOCK = 16, ROW = 64, COORDINATES = 6 };
+/* Vertices of a block: two vectors of floats. Boxes of a row, which are measured at once, and its groups. */
+enum { BLOCK = 16, ROW = 64, GROUPS = 16, COORDINATES = 6 };
 
 static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|² against |x − x'|², areas being 4π */
 
@@ -139,8 +139,9 @@ void orb_searched_fill(const double *position, const double *normal, orb_searche
   }
 }
 
-/* Squared distances of the vertices of a block. */
-ORB_CLONES static void measure_block(const float *at, int32_t columns, const float q[COORDINATES], float *out) {
+/* Squared distances of the vertices of a block. Returns whether one is less than `least`. */
+ORB_CLONES static int measure_block(const float *at, int32_t columns, const float q[COORDINATES], float least,
+                                    float *out) {
   float sum[BLOCK] = {0};
   for (int k = 0; k < COORDINATES; k++) {
     const float *column = at + k * (ptrdiff_t)columns;
@@ -149,12 +150,22 @@ ORB_CLONES static void measure_block(const float *at, int32_t columns, const flo
       sum[i] += d * d;
     }
   }
+  int is_nearer = 0;
+  for (int i = 0; i < BLOCK; i++) {
+    is_nearer |= sum[i] < least;
+  }
   memcpy(out, sum, sizeof sum);
+  return is_nearer;
 }
 
-/* Squared distances of a row of boxes. No vertex of a box is nearer, also by rounded sums: each operation rounds
- * monotonically, and both add in the same order. */
-ORB_CLONES static void measure_boxes(const float *box, int32_t boxes, const float q[COORDINATES], float *out) {
+/* Squared distances of a row of boxes. Group g has the boxes g, g + GROUPS, … */
+typedef struct row_distances {
+  float box[ROW], least[GROUPS];
+} row_distances;
+
+/* Squared distances of a row of boxes, and the least of each group. No vertex of a box is nearer, also by rounded sums:
+ * each operation rounds monotonically, and both add in the same order. */
+ORB_CLONES static void measure_boxes(const float *box, int32_t boxes, const float q[COORDINATES], row_distances *out) {
   float sum[ROW] = {0};
   for (int k = 0; k < COORDINATES; k++) {
     const float *least = box + k * (ptrdiff_t)boxes, *greatest = least + COORDINATES * (ptrdiff_t)boxes;
@@ -165,38 +176,57 @@ ORB_CLONES static void measure_boxes(const float *box, int32_t boxes, const floa
       sum[i] += d * d;
     }
   }
-  memcpy(out, sum, sizeof sum);
+  for (int g = 0; g < GROUPS; g++) {
+    float least = sum[g];
+    for (int i = g + GROUPS; i < ROW; i += GROUPS) {
+      least = sum[i] < least ? sum[i] : least;
+    }
+    out->least[g] = least;
+  }
+  memcpy(out->box, sum, sizeof sum);
 }
 
 /* Of the vertices of a block, and of the best one before. */
 static void look_at_block(const orb_searched *s, int32_t block, const float q[COORDINATES], float *least,
                           int32_t *best) {
   float distance[BLOCK];
-  measure_block(s->at + block * BLOCK, s->columns, q, distance);
-  for (int i = 0; i < BLOCK; i++) {
+  const int is_nearer = measure_block(s->at + block * BLOCK, s->columns, q, *least, distance);
+  for (int i = 0; is_nearer && i < BLOCK; i++) {
     *best = distance[i] < *least ? block * BLOCK + i : *best;
     *least = distance[i] < *least ? distance[i] : *least;
   }
+}
+
+static int nearest_box(const row_distances *d) {
+  int group = 0;
+  for (int g = 1; g < GROUPS; g++) {
+    group = d->least[g] < d->least[group] ? g : group;
+  }
+  int nearest = group;
+  for (int i = group + GROUPS; i < ROW; i += GROUPS) {
+    nearest = d->box[i] < d->box[nearest] ? i : nearest;
+  }
+  return nearest;
 }
 
 int32_t orb_searched_nearest(const orb_searched *s, const double x[3], const double n[3]) {
   const float weight = (float)sqrt(NORMAL_WEIGHT);
   const float q[COORDINATES] = {(float)x[0],          (float)x[1],          (float)x[2],
                                 weight * (float)n[0], weight * (float)n[1], weight * (float)n[2]};
-  float least = INFINITY, distance[ROW];
+  float least = INFINITY;
   int32_t best = 0;
   for (int32_t row = 0; row < s->boxes; row += ROW) {
-    measure_boxes(s->box + row, s->boxes, q, distance);
-    int32_t first = 0;
-    for (int i = 1; i < ROW; i++) {
-      first = distance[i] < distance[first] ? i : first;
-    }
-    if (distance[first] < least) {
+    row_distances d;
+    measure_boxes(s->box + row, s->boxes, q, &d);
+    const int first = nearest_box(&d);
+    if (d.box[first] < least) {
       look_at_block(s, row + first, q, &least, &best);
     }
-    for (int i = 0; i < ROW; i++) {
-      if (distance[i] < least && i != first) {
-        look_at_block(s, row + i, q, &least, &best);
+    for (int g = 0; g < GROUPS; g++) {
+      for (int i = g; i < ROW && d.least[g] < least; i += GROUPS) {
+        if (d.box[i] < least && i != first) {
+          look_at_block(s, row + i, q, &least, &best);
+        }
       }
     }
   }
