@@ -1,10 +1,10 @@
 /* Alignment without landmarks.
  *
  * The shapes are embedded anew, on spheres that keep angles. Every later shape is matched with the first one
- * (find/match.c), and the composed map goes to the targets of its match. Where that leads to no good map of two shapes,
- * samples of the match guide landmark walks. Where that leads to none either, pairs of the matches are pinned as
- * landmarks, and the map is composed with them held and then without them. The alignment of least energy is returned.
- * The preset `fast` searches for rotations of the given spheres only.
+ * (find/match.c), and the composed map goes to the targets of its match. Of two shapes, the next best match is tried
+ * where that leads to no good map. Of more, pairs of the matches are pinned as landmarks where it leads to none, and
+ * the map is composed with them held and then without them. The alignment of least energy is returned. The preset
+ * `fast` searches for rotations of the given spheres only.
  */
 #include <math.h>
 #include <string.h>
@@ -240,7 +240,7 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   if (next.is_open && next.alignment.energy <= poor) {
     ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
   }
-  if (!first.is_walked) {
+  if (m->shape_count > 2) { /* of two, walks have been tried */
     ORB_GO(status, pin_poor(ctx, shapes, m, options, alignment), end);
   }
   status = next_take(ctx, m, poor, &next, alignment);

@@ -102,10 +102,13 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
   const int64_t work = p->walked.work * (int64_t)c->vertex_count;
   const int most = c->beat > 0 ? p->walked.beat_most : ORB_MAP_GUIDED;
   int agree = 0;
-  for (int i = 0; i < most && best->energy > p->walked.enough && !agree; i++) {
+  for (int i = 0; i < most + ORB_MAP_GUIDED_FEW && best->energy > p->walked.enough && !agree; i++) {
     orb_map_walked w;
+    if (i >= most && best->energy < INFINITY) {
+      break;
+    }
     c->work = c->work > work ? c->work : work;
-    orb_status status = orb_map_walked_create(c, p->walked.guides[i], &w);
+    orb_status status = orb_map_walked_create(c, i < most ? p->walked.guides[i] : p->walked.few[i - most], &w);
     agree = w.energy < INFINITY && fabs(w.energy - best->energy) <= p->walked.agree * w.energy;
     if (status == ORB_OK && w.energy < best->energy) {
       orb_map_walked worse = *best;

@@ -53,6 +53,7 @@ static const orb_map_params DEFAULTS = {
                .twisted = 2.5,
                .work = 800,
                .guides = {18, 50, -25, -35, 25, -18},
+               .few = {6, 4},
                .enough = 1.4,
                .beat_most = 2,
                .agree = 0.03},

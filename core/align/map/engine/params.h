@@ -25,6 +25,7 @@ enum {
   ORB_MAP_BANDS = 16,            /* rings of a limb: more resolve the twist better, fewer have more vertices each */
   ORB_MAP_IRON_ROUNDS = 4,       /* of ironing, each of other parts */
   ORB_MAP_GUIDED = 6,            /* guided walks; one takes 0.1 to 0.4 s on its coarse level */
+  ORB_MAP_GUIDED_FEW = 2,        /* those with few samples */
   ORB_MAP_CROSSINGS = 400,       /* edges that one step of a vertex crosses at most; a guard against rounding */
   ORB_MAP_RING_CROSSINGS = 8192  /* the same for a ring around a limb */
 };
@@ -118,13 +119,14 @@ typedef struct orb_map_params {
     double hopeless; /* energy of the first level above which the walk has twisted limbs, and no finer level helps */
     double twisted;  /* the same of the last level */
     int work;        /* least that each guided walk has, as work.all */
-    int32_t guides[ORB_MAP_GUIDED]; /* samples of the spatial targets that guide one walk each, spread over the moving
-                        shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
-                        walk get stuck, and which is best is close to chance */
-    double enough;                  /* energy of a coarse map up to which no further walk is tried */
-    int beat_most;                  /* most walks where run->beat is known */
-    double agree;                   /* relative difference of two such energies up to which none is: both walks came to
-                                       one basin */
+    int32_t guides[ORB_MAP_GUIDED];  /* samples of the spatial targets that guide one walk each, spread over the moving
+                         shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
+                         walk get stuck, and which is best is close to chance */
+    int32_t few[ORB_MAP_GUIDED_FEW]; /* the same where none of these led to a map: a blade has no room for more */
+    double enough;                   /* energy of a coarse map up to which no further walk is tried */
+    int beat_most;                   /* most walks where run->beat is known */
+    double agree;                    /* relative difference of two such energies up to which none is: both walks came to
+                                        one basin */
   } walked;
 
   /* Sweeps over a level. */
