@@ -158,6 +158,7 @@ typedef struct next_match {
   int is_open;
   double *target;
   orb_alignment alignment;
+  orb_map_course course;
 } next_match;
 
 static void next_free(orb_context *ctx, next_match *next) {
@@ -167,9 +168,11 @@ static void next_free(orb_context *ctx, next_match *next) {
 }
 
 /* Composes two shapes towards the next best match, unless the best one has led to a good map, or the next one is far
- * behind. Its first start is compared with that of the best match, which had the same effort. */
+ * behind. A start from its targets is compared with that of the best match, which had the same effort; a walk with what
+ * the best match has led to. */
 static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                            const orb_align_options *options, double energy, orb_map_first first, next_match *next) {
+                            const orb_align_options *options, double energy, const orb_map_course *best,
+                            next_match *next) {
   orb_align_options rotated = *options;
   rotated.preset = ORB_PRESET_FAST;
   if (m->shape_count != 2 || m->of[1].other_count == 0 || !(energy > ORB_FIND_OTHER_ABOVE) ||
@@ -182,18 +185,24 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
   const double *const targets[2] = {NULL, next->target};
   const orb_aims aims = {.targets = targets,
                          .keep_angles = m->keep_angles,
-                         .beat = (first.is_walked ? ORB_FIND_OTHER_GAIN : ORB_FIND_OTHER_STARTED) * first.energy,
-                         .walks_first = first.is_walked || m->bend * m->of[1].other[0].cost > ORB_FIND_WALKS_FIRST};
+                         .beat = {.bulk = best->first_bulk, .energy = ORB_FIND_OTHER_GAIN * energy},
+                         .course = &next->course,
+                         .walks_first = best->is_walked || m->bend * m->of[1].other[0].cost > ORB_FIND_WALKS_FIRST};
   return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, &aims, options->preset);
 }
 
-/* Makes the next best match the match, if its map has clearly less energy than the best one's: a twisted body can
- * bend less when its limbs are swapped, and then only the energy of the map shows the mistake. Since bend and energy
- * disagree, the match counts as unclear. */
-static orb_status next_take(orb_context *ctx, matches *m, double poor, next_match *next, orb_alignment *alignment) {
-  if (!next->is_open || !(next->alignment.energy < ORB_FIND_OTHER_GAIN * alignment->energy)) {
-    return ORB_OK;
+/* Is the map of the next best match clearly better? Starts crumple by chance, so their bulk decides; walks do not. */
+static int next_is_better(const next_match *next, double energy, const orb_map_course *best) {
+  if (!next->is_open || next->course.is_beaten) {
+    return 0;
   }
+  return best->is_walked || next->course.is_walked ? next->alignment.energy < ORB_FIND_OTHER_GAIN * energy
+                                                   : next->course.bulk - 1 < ORB_FIND_OTHER_GAIN * (best->bulk - 1);
+}
+
+/* Makes the next best match the match: a twisted body can bend less when its limbs are swapped, and then only the map
+ * shows the mistake. Since bend and map disagree, the match counts as unclear. */
+static orb_status next_take(orb_context *ctx, matches *m, double poor, next_match *next, orb_alignment *alignment) {
   const double clear = fmax(0, 1 - next->alignment.energy / fmin(alignment->energy, poor));
   double *target = next->target;
   orb_alignment_free(ctx, alignment);
@@ -223,27 +232,26 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
   return ORB_OK;
 }
 
-/* Composes a rotated alignment towards the matches; where that has led to no good map, towards the next best match as
- * well; and where neither has led to one, by other ways to the best one. */
+/* Composes a rotated alignment towards the matches. Where that has led to no good map, goes on towards the next best
+ * match of two shapes, or pins pairs of the matches of several. */
 static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, matches *m,
                                  const orb_align_options *options, orb_alignment *alignment) {
   const double poor = orb_map_params_of(options->preset).energy.poor;
   next_match next = {0};
   orb_status status;
-  orb_map_first first = {.energy = INFINITY};
+  orb_map_course course = {0};
   const orb_aims aims = {.targets = m->targets,
                          .keep_angles = m->keep_angles,
-                         .first = &first,
+                         .course = &course,
                          .walks_first = m->bend > ORB_FIND_WALKS_FIRST};
   ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? &aims : NULL, options->preset));
-  ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, first, &next), end);
-  if (next.is_open && next.alignment.energy <= poor) {
-    ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
+  if (m->shape_count > 2) {
+    return pin_poor(ctx, shapes, m, options, alignment);
   }
-  if (m->shape_count > 2) { /* of two, walks have been tried */
-    ORB_GO(status, pin_poor(ctx, shapes, m, options, alignment), end);
+  ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, &course, &next), end);
+  if (next_is_better(&next, alignment->energy, &course)) {
+    status = next_take(ctx, m, poor, &next, alignment);
   }
-  status = next_take(ctx, m, poor, &next, alignment);
 end:
   next_free(ctx, &next);
   return status;

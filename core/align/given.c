@@ -65,7 +65,7 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
                                  .target = aims->targets ? aims->targets[s] : NULL,
                                  .keeps_angles = aims->keep_angles,
                                  .beat = aims->beat,
-                                 .first = aims->first,
+                                 .course = aims->course,
                                  .walks_first = aims->walks_first};
     double energy[2];
     int improved;

@@ -40,8 +40,8 @@ ORB_MUST_CHECK orb_status orb_align_pinned(orb_context *ctx, const orb_align_sha
 typedef struct orb_aims {
   const double *const *targets; /* NULL, or for each shape but the first what orb_compose() takes */
   int keep_angles;              /* the spheres of the shapes do */
-  double beat;                  /* as in orb_map_guide */
-  orb_map_first *first;         /* likewise; of the last shape */
+  orb_map_beat beat;            /* as in orb_map_guide */
+  orb_map_course *course;       /* likewise; of the last shape */
   int walks_first;              /* likewise */
 } orb_aims;
 

@@ -347,7 +347,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
                    .given_target = guide->target,
                    .keeps_angles = guide->keeps_angles,
                    .beat = guide->beat,
-                   .first = guide->first,
+                   .wants_course = guide->course != NULL,
                    .walks_first = guide->walks_first && both,
                    .springs = guide->springs,
                    .hopeless = INFINITY,
@@ -385,10 +385,14 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
-    const int is_hopeless = c.is_beaten || (c.given_target && c.best_energy > c.params.targets.hopeless);
+    const int is_hopeless = c.course.is_beaten || (c.given_target && c.best_energy > c.params.targets.hopeless);
     if (!is_hopeless && (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0])) {
       ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
     }
+  }
+  if (guide->course) {
+    ORB_GO(status, orb_map_bulk(&c, &c.course.bulk), done);
+    *guide->course = c.course;
   }
   status = take_best(&c, fixed, energy, improved);
 done:

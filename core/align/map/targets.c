@@ -54,7 +54,7 @@ static orb_status start_guided(orb_map_run *c) {
   orb_map_walked best = {.energy = INFINITY};
   orb_status status;
   ORB_GO(status, orb_map_walked_improve(c, &best), done);
-  if (best.energy < c->best_energy && !(c->beat > 0 && best.energy >= c->beat)) {
+  if (best.energy < c->best_energy && !(c->beat.energy > 0 && best.energy >= c->beat.energy)) {
     allow(c);
     ORB_GO(status, orb_map_walked_refine(c, &best), done);
   }
@@ -74,8 +74,7 @@ static orb_status run_passes(orb_map_run *c) {
   return orb_map_run_passes(c, 0);
 }
 
-/* The first start, and walks where that leads to no map of shapes that correspond. *walked: a walk leads to the best
- * map. */
+/* The first start. *walked: it is a walk. */
 static orb_status run_first(orb_map_run *c, int *walked) {
   const double given = c->best_energy;
   ORB_TRY(orb_map_register(c, 0));
@@ -84,18 +83,16 @@ static orb_status run_first(orb_map_run *c, int *walked) {
     ORB_TRY(start_guided(c));
   }
   *walked = c->best_energy < given;
-  if (!*walked && !(c->walks_first && c->beat > 0)) {
+  if (!*walked && !(c->walks_first && c->beat.energy > 0)) {
     ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
   }
-  const double started = c->best_energy;
-  if (c->both && !c->walks_first && started > c->params.targets.walked) {
-    ORB_TRY(start_guided(c));
-    *walked = c->best_energy < started;
+  orb_map_course *course = &c->course;
+  course->is_walked = *walked;
+  if (c->wants_course) {
+    ORB_TRY(orb_map_bulk(c, &course->first_bulk));
   }
-  c->is_beaten = c->beat > 0 && !(c->best_energy < c->beat);
-  if (c->first) {
-    *c->first = (orb_map_first){c->best_energy, *walked};
-  }
+  course->is_beaten =
+      c->walks_first ? c->beat.energy > 0 && !*walked : c->beat.bulk > 0 && !(course->first_bulk < c->beat.bulk);
   return ORB_OK;
 }
 
@@ -115,17 +112,36 @@ static orb_status run_starts(orb_map_run *c) {
   return c->best_energy > p->energy.poor ? start_through_samples(c) : ORB_OK;
 }
 
+/* A walk has few crumples, which draws would smooth. */
+static orb_status improve_walked(orb_map_run *c) {
+  return c->best_energy > good_energy(c) && c->best_energy <= c->params.energy.poor ? run_passes(c) : ORB_OK;
+}
+
+static orb_status walk_last(orb_map_run *c, int *walked) {
+  const double before = c->best_energy;
+  ORB_TRY(orb_map_register(c, 0));
+  ORB_TRY(start_guided(c));
+  *walked = c->best_energy < before;
+  return ORB_OK;
+}
+
 orb_status orb_map_follow_targets(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   int walked;
   ORB_TRY(run_first(c, &walked));
-  if (c->is_beaten) {
+  if (c->course.is_beaten) {
     return ORB_OK;
   }
   if (walked) {
-    return c->best_energy > good_energy(c) && c->best_energy <= p->energy.poor ? run_passes(c) : ORB_OK;
+    return improve_walked(c);
   }
   ORB_TRY(run_starts(c));
+  if (c->both && !c->walks_first && c->best_energy > p->targets.walked) {
+    ORB_TRY(walk_last(c, &walked));
+  }
+  if (walked) {
+    return improve_walked(c);
+  }
   double started = c->best_energy;
   if (started <= good_energy(c) || started > p->targets.hopeless) {
     return ORB_OK;

@@ -100,7 +100,7 @@ done:
 orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
   const orb_map_params *p = &c->params;
   const int64_t work = p->walked.work * (int64_t)c->vertex_count;
-  const int most = c->beat > 0 ? p->walked.beat_most : ORB_MAP_GUIDED;
+  const int most = c->beat.energy > 0 ? p->walked.beat_most : ORB_MAP_GUIDED;
   int agree = 0;
   for (int i = 0; i < most + ORB_MAP_GUIDED_FEW && best->energy > p->walked.enough && !agree; i++) {
     orb_map_walked w;

@@ -31,11 +31,19 @@ typedef struct orb_map_level_map {
   orb_hierarchy **hierarchy; /* of the moving shape; one level of it has these vertices. It is taken over */
 } orb_map_level_map;
 
-/* What the first start towards a target has led to. */
-typedef struct orb_map_first {
-  double energy;
-  int is_walked; /* by a landmark walk */
-} orb_map_first;
+/* What a run towards a target has led to. A bulk is the energy of a map in which one triangle counts little
+ * (params.energy.bulk). */
+typedef struct orb_map_course {
+  double first_bulk, bulk; /* after the first start, and at last */
+  int is_walked;           /* the first start is a landmark walk */
+  int is_beaten;           /* it does not beat what it has to, and is the last */
+} orb_map_course;
+
+/* What a first start has to beat, unless it is the last: 0: nothing. */
+typedef struct orb_map_beat {
+  double bulk;   /* of a start from targets */
+  double energy; /* of a walk */
+} orb_map_beat;
 
 /* What guides a composed map. */
 typedef struct orb_map_guide {
@@ -44,11 +52,10 @@ typedef struct orb_map_guide {
                            replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
   int keeps_angles;     /* the spheres do (sheet/even.h); then embeddings made on the way do as well, and the places of
                            the targets are smoothed */
-  double beat;          /* with a target: unless the first start has less energy than this, it is the last. 0: it never
-                           is */
-  orb_map_first *first; /* with a target: NULL, or set */
-  int walks_first;      /* with a target and `both`: a walk is tried before the start from the targets, and in its place
-                           where it leads to a map */
+  orb_map_beat beat;    /* with a target */
+  orb_map_course *course; /* with a target: NULL, or set */
+  int walks_first; /* with a target and `both`: a walk is tried before the start from the targets, and in its place
+                    where it leads to a map */
   orb_map_springs springs; /* with ORB_MAP_FROM_PINS and ORB_MAP_FROM_COPY */
   orb_map_level_map copy;  /* with ORB_MAP_FROM_COPY */
 } orb_map_guide;

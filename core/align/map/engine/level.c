@@ -334,7 +334,10 @@ void orb_map_level_part_energies(const orb_map_level *l, const int32_t *part, in
 }
 
 double orb_map_level_energy(const orb_map_level *l) {
-  const double cap = l->params->energy.cap;
+  return orb_map_level_capped_energy(l, l->params->energy.cap);
+}
+
+double orb_map_level_capped_energy(const orb_map_level *l, double cap) {
   double energy = 0, weight = 0;
   for (int32_t v = 0; v < l->count; v++) {
     for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {

@@ -94,5 +94,7 @@ void orb_map_level_part_energies(const orb_map_level *level, const int32_t *part
 
 /* Symmetric Dirichlet energy of the composed map, capped for each triangle and weighted by area; 1: isometric. */
 double orb_map_level_energy(const orb_map_level *level);
+/* The same with another cap. */
+double orb_map_level_capped_energy(const orb_map_level *level, double cap);
 
 #endif

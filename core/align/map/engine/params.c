@@ -4,7 +4,7 @@
 #include <math.h>
 
 static const orb_map_params DEFAULTS = {
-    .energy = {.good = 1.2, .poor = 1.45, .cap = 20},
+    .energy = {.good = 1.2, .poor = 1.45, .cap = 20, .bulk = 1.2},
     .work = {.all = 800,
              .given_up = 90,
              .untwisted = 250,

@@ -33,6 +33,19 @@ orb_status orb_map_full_level(orb_map_run *c, const double *points, const orb_co
   return status;
 }
 
+orb_status orb_map_bulk(orb_map_run *c, double *bulk) {
+  orb_corner_table s;
+  orb_map_level level = {0};
+  ORB_TRY(orb_corner_table_create(c->ctx, &c->moving->mesh, &s));
+  orb_status status = orb_map_full_level(c, c->best, &s, &level);
+  if (status == ORB_OK) {
+    *bulk = orb_map_level_capped_energy(&level, c->params.energy.bulk);
+  }
+  orb_map_level_free(c->ctx, &level);
+  orb_corner_table_free(c->ctx, &s);
+  return status;
+}
+
 /* Builds the surface at the points that run->fixed_points says. */
 static orb_status rebuild(orb_map_run *c) {
   orb_aligned_shape shape = {.mesh = c->fixed->mesh, .points = c->fixed_points ? c->fixed_points : c->fixed->points};

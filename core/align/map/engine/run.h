@@ -50,10 +50,10 @@ typedef struct orb_map_run {
   orb_map_candidate kept;     /* the best map from before they changed */
   double *x, *normal;         /* moving shape, area 4π */
   int keeps_angles;           /* see orb_map_guide */
-  double beat;                /* likewise */
-  orb_map_first *first;       /* likewise */
+  orb_map_beat beat;          /* likewise */
   int walks_first;            /* likewise */
-  int is_beaten;              /* the first start was the last */
+  orb_map_course course;      /* likewise; its bulks only where they are asked for */
+  int wants_course;           /* they are */
   const double *given_target; /* for registrations without samples, in the fixed shape's space; NULL: computed */
   int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
   double *target;             /* spatial targets, once the moving shape is registered */
@@ -75,6 +75,9 @@ typedef struct orb_map_run {
   int passes;             /* registrations through samples of the best map that are left */
   int64_t work;           /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
+
+/* The energy of the best map in which a triangle counts params.energy.bulk at most. O(n). */
+ORB_MUST_CHECK orb_status orb_map_bulk(orb_map_run *run, double *bulk);
 
 /* A level of all vertices at these points (mesh order), with the landmarks pinned. s: the order of the vertices; it
  * stays the caller's. */
