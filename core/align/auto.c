@@ -185,19 +185,15 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
   const double *const targets[2] = {NULL, next->target};
   const orb_aims aims = {.targets = targets,
                          .keep_angles = m->keep_angles,
-                         .beat = {.bulk = best->first_bulk, .energy = ORB_FIND_OTHER_GAIN * energy},
+                         .beat = {.bulk = best->first_bulk, .energy = energy},
                          .course = &next->course,
                          .walks_first = best->is_walked || m->bend * m->of[1].other[0].cost > ORB_FIND_WALKS_FIRST};
   return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, &aims, options->preset);
 }
 
-/* Is the map of the next best match clearly better? Starts crumple by chance, so their bulk decides; walks do not. */
-static int next_is_better(const next_match *next, double energy, const orb_map_course *best) {
-  if (!next->is_open || next->course.is_beaten) {
-    return 0;
-  }
-  return best->is_walked || next->course.is_walked ? next->alignment.energy < ORB_FIND_OTHER_GAIN * energy
-                                                   : next->course.bulk - 1 < ORB_FIND_OTHER_GAIN * (best->bulk - 1);
+/* Is the map of the next best match clearly better? */
+static int next_is_better(const next_match *next, const orb_map_course *best) {
+  return next->is_open && !next->course.is_beaten && next->course.bulk - 1 < ORB_FIND_OTHER_GAIN * (best->bulk - 1);
 }
 
 /* Makes the next best match the match: a twisted body can bend less when its limbs are swapped, and then only the map
@@ -249,7 +245,7 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
     return pin_poor(ctx, shapes, m, options, alignment);
   }
   ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, &course, &next), end);
-  if (next_is_better(&next, alignment->energy, &course)) {
+  if (next_is_better(&next, &course)) {
     status = next_take(ctx, m, poor, &next, alignment);
   }
 end:
