@@ -7,9 +7,9 @@
 #include "numeric/vec3.h"
 
 /* Most Newton steps to an eigenvalue, from above; three or four suffice where it is far from the next one. And, of the
- * cubed eigenvalue, the least product of its distances from the others at which the eigenvector has ten digits. */
-enum { STEPS = 20 };
-static const double CLEAR = 1e-6;
+ * cubed eigenvalue, the least product of its distances from the others at which these steps suffice. */
+enum { STEPS = 30 };
+static const double CLEAR = 1e-3;
 
 /* The determinant of the rows and columns of a 4×4 matrix but for one of each, with the sign of a cofactor. */
 static double cofactor(double m[4][4], int row, int column) {

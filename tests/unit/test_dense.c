@@ -1,4 +1,4 @@
-/* Compares the linear solver and the 3 × 3 singular values with their definitions. */
+/* Compares the linear solver, the 3 × 3 singular values and the nearest rotation with their definitions. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "numeric/dense.h"
+#include "numeric/rotation.h"
 
 static uint64_t state = 88172645463325252ULL;
 static double uniform(void) { /* −1 … 1 */
@@ -109,8 +110,54 @@ static void test_svd(void **unused) {
   assert_true(fabs(s[0] - 3) < 1e-15 && fabs(s[1] - 2) < 1e-15 && fabs(s[2] - 1) < 1e-15);
 }
 
+/* The rotation nearest to h has the greatest trace of Rᵀ h: the sum of the singular values, the least of them negated
+ * where h mirrors. */
+static void check_rotation(const double h[9]) {
+  double r[9], u[9], s[3], v[9], trace = 0;
+  assert_int_equal(orb_nearest_rotation(h, r), 1);
+  orb_svd3(h, u, s, v);
+  const double det =
+      h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) + h[2] * (h[3] * h[7] - h[4] * h[6]);
+  for (int i = 0; i < 9; i++) {
+    trace += r[i] * h[i];
+    double product = 0;
+    for (int k = 0; k < 3; k++) {
+      product += r[3 * (i / 3) + k] * r[3 * (i % 3) + k];
+    }
+    assert_true(fabs(product - (i / 3 == i % 3)) < 1e-13);
+  }
+  assert_true(
+      r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]) > 0);
+  assert_true(fabs(trace - (s[0] + s[1] + (det < 0 ? -s[2] : s[2]))) <= 1e-13 * (s[0] + 1e-300));
+}
+
+/* Also of rank 1 and 2, near a mirror image, and of any size. */
+static void test_rotation(void **unused) {
+  (void)unused;
+  for (int i = 0; i < 20000; i++) {
+    double h[9];
+    for (int k = 0; k < 9; k++) {
+      h[k] = uniform();
+    }
+    for (int k = 0; k < 3; k++) {
+      h[6 + k] = i % 4 == 1 ? h[k] - h[3 + k] : i % 4 == 2 ? 1e-5 * h[6 + k] : h[6 + k];
+      h[3 + k] = i % 4 == 2 ? h[k] : h[3 + k];
+    }
+    const double scale = pow(10, 30 * uniform());
+    for (int k = 0; k < 9; k++) {
+      h[k] *= scale;
+    }
+    check_rotation(h);
+  }
+  double r[9];
+  check_rotation((const double[9]){0});
+  check_rotation((const double[9]){1, 0, 0, 0, 1, 0, 0, 0, -1});
+  check_rotation((const double[9]){-1, 0, 0, 0, -1, 0, 0, 0, -1});
+  assert_int_equal(orb_nearest_rotation((const double[9]){NAN}, r), 0);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_solve), cmocka_unit_test(test_singular),
-                                     cmocka_unit_test(test_svd)};
+                                     cmocka_unit_test(test_svd), cmocka_unit_test(test_rotation)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 
 #include "align/find/match.h"
 #include "elastic/elastic.h"
+#include "elastic/searched.h"
 #include "support_context.h"
 #include "support_shapes.h"
 
@@ -241,10 +242,57 @@ static void few_vertices_are_matched_by_rotations(void **state) {
   shape_free(ctx, &b);
 }
 
+/* The squared distance in position and half-weighted normal. */
+static double away(const double *x, const double *n, const double *y, const double *m) {
+  double sum = 0;
+  for (int k = 0; k < 3; k++) {
+    sum += (x[k] - y[k]) * (x[k] - y[k]) + 0.25 * (n[k] - m[k]) * (n[k] - m[k]);
+  }
+  return sum;
+}
+
+/* The search by boxes finds what a look at all vertices finds, also once they have moved from where they were put into
+ * blocks, and for any count of them. */
+static void the_nearest_vertex_is_found(void **state) {
+  (void)state;
+  enum { MOST = 1500 };
+  static const int32_t counts[] = {1, 15, 16, 17, 1024, 1025, MOST};
+  static double at[3 * MOST], normal[3 * MOST];
+  uint64_t bits = 88172645463325252ULL;
+  for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
+    const int32_t n = counts[c];
+    orb_searched searched;
+    for (int round = 0; round < 2; round++) {
+      for (int32_t i = 0; i < 3 * n; i++) {
+        bits = bits * 6364136223846793005ULL + 1442695040888963407ULL;
+        at[i] = (double)(bits >> 40) / (1 << 24);
+        normal[i] = (double)(bits >> 20 & 0xffffff) / (1 << 24) - 0.5;
+      }
+      if (round == 0) {
+        assert_int_equal(orb_searched_create(ctx, at, normal, n, &searched), ORB_OK);
+      }
+      orb_searched_fill(at, normal, &searched);
+      for (int32_t q = 0; q < 200; q++) {
+        const double x[3] = {at[q % n] + 0.1, at[(q + 1) % n], at[(q + 2) % n] - 0.2}, *m = normal + 3 * (q % n);
+        const int32_t found = orb_searched_nearest(&searched, x, m);
+        double least = INFINITY;
+        for (int32_t v = 0; v < n; v++) {
+          least = fmin(least, away(x, m, at + 3 * v, normal + 3 * v));
+        }
+        assert_true(away(x, m, at + 3 * found, normal + 3 * found) <= least * (1 + 1e-5));
+      }
+    }
+    orb_searched_free(ctx, &searched);
+  }
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(a_rotation_is_found),    cmocka_unit_test(a_bent_tube_is_found),
-      cmocka_unit_test(wrong_limbs_bend),       cmocka_unit_test(a_copy_is_matched),
-      cmocka_unit_test(threads_change_nothing), cmocka_unit_test(few_vertices_are_matched_by_rotations)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(a_rotation_is_found),
+                                     cmocka_unit_test(a_bent_tube_is_found),
+                                     cmocka_unit_test(wrong_limbs_bend),
+                                     cmocka_unit_test(a_copy_is_matched),
+                                     cmocka_unit_test(threads_change_nothing),
+                                     cmocka_unit_test(the_nearest_vertex_is_found),
+                                     cmocka_unit_test(few_vertices_are_matched_by_rotations)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }
