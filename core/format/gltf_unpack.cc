@@ -10,7 +10,6 @@ namespace gltf {
 
 namespace {
 
-
 bool has_extension(const cJSON *object, const char *name) {
   return member(member(object, "extensions"), name) != nullptr;
 }

@@ -3,8 +3,8 @@
 #define ORB_NUMERIC_ROTATION_H
 
 /* Sets r to the rotation nearest to the 3×3 matrix h, both row-major (Kabsch 1976; never a reflection). By
- * quaternions; by singular values where the two greatest eigenvalues of these are near each other. Returns 0 if h is not
- * finite. */
+ * quaternions; by singular values where the two greatest eigenvalues of these are near each other. Returns 0 if h is
+ * not finite. */
 int orb_nearest_rotation(const double h[9], double r[9]);
 
 #endif
