@@ -12,6 +12,7 @@
 
 #include "folder_lock.h"
 #include "log.h"
+#include "store/object_removal.h"
 #include "store/snapshot.h"
 #include "store/transfer.h"
 

@@ -1,10 +1,11 @@
-/* `orbmorphd backup DIR`: the data folder as of one moment, also while a daemon serves it. `orbmorphd restore DIR`: a
- * new data folder from that.
+/* `orbmorphd backup DIR`: copies the data folder as it is at one moment, even while a daemon serves it. `orbmorphd
+ * restore DIR`: makes a new data folder from that copy.
  *
- * A backup is laid out like a data folder: catalogue.sqlite and objects, and a file `backup` that marks it. While a
- * backup runs it holds the lock of objects_backup_lock(), so no object that its catalogue names is deleted. Objects
- * come first, then the catalogue is replaced, then objects that it does not name are deleted: at each moment the folder
- * is the previous backup or the new one, so a backup may be killed.
+ * A backup is laid out like a data folder: catalogue.sqlite and objects, and a file `backup` that marks it. A
+ * backup holds the lock of objects_backup_lock() while it runs, so the daemon deletes no object that the copied
+ * catalogue names. It copies objects first, then replaces the catalogue, then deletes objects that the new catalogue
+ * does not name. So the folder is always a complete backup, the previous or the new one, and the process may be killed
+ * at any time.
  */
 #ifndef ORB_BACKUP_H
 #define ORB_BACKUP_H

@@ -5,6 +5,7 @@
 
 #include "faults.h"
 #include "log.h"
+#include "store/object_removal.h"
 #include "store/owners.h"
 
 enum { PAGE = 64 };

@@ -1,4 +1,5 @@
-/* The hash of the server's tables, whose keys callers choose or can find by trying: keyed at random in each process. */
+/* The hash of the server's tables. Callers can choose the keys of those tables, so the hash has a random key of its own
+ * in each process. */
 #ifndef ORB_SERVER_HASH_H
 #define ORB_SERVER_HASH_H
 

@@ -14,6 +14,7 @@
 #include "isolate/readers.h"
 #include "log.h"
 #include "store/crashes.h"
+#include "store/object_removal.h"
 #include "store/owners.h"
 
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload) {

@@ -23,6 +23,7 @@
 #include "migrate.h"
 #include "net/client.h"
 #include "scrub.h"
+#include "store/object_removal.h"
 #include "store/place.h"
 #include "systemd.h"
 #include "trace/send.h"

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "evict.h"
+#include "store/object_removal.h"
 #include "store/owners.h"
 #include "store/place.h"
 #include "store/spheres.h"

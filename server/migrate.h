@@ -1,5 +1,5 @@
-/* `orbmorphd migrate`: copies a deployment to another data folder, database and bucket, see store/move.h. No daemon
- * runs on either meanwhile. */
+/* `orbmorphd migrate`: copies a deployment to another data folder, database and bucket, see store/move.h. No daemon may
+ * run on either of them meanwhile. */
 #ifndef ORB_MIGRATE_H
 #define ORB_MIGRATE_H
 

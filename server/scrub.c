@@ -11,6 +11,7 @@
 #include "evict.h"
 #include "log.h"
 #include "orbmorph/context.h"
+#include "store/object_removal.h"
 #include "store/verify.h"
 
 /* SEEK: what an object costs besides its bytes, in bytes. NAMED: findings that the log names in one round. */

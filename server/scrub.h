@@ -8,7 +8,7 @@
 
 #include "store/catalogue.h"
 
-/* Of the last complete round, but for the sums. */
+/* Of the last complete round, except the sums. */
 typedef struct scrub_report {
   int64_t rounds, bytes; /* sums since the start; bytes: read from objects */
   int64_t ended;         /* Unix time in seconds; 0: no round has ended */

@@ -8,8 +8,8 @@ namespace gltf {
 
 namespace {
 
-const size_t STRIDE_MAX = 1u << 20;  /* bytes between elements that are accepted; glTF itself allows 252 at most */
-const size_t CHECK_EVERY = 1u << 20; /* elements between two checks for cancellation */
+const size_t STRIDE_MAX = 1u << 20;       /* bytes between elements that are accepted; glTF itself allows 252 at most */
+const size_t ELEMENTS_A_CHECK = 1u << 20; /* elements between two checks for cancellation */
 
 /* Components that may be decoded in all: exporters let 50 primitives share an accessor, not a thousand. */
 const size_t WORK_PER_BYTE = 32, WORK_OF_ANY = 4u << 20;
@@ -132,7 +132,7 @@ void Buffers::read_elements(int64_t view_index, size_t offset, size_t stride, in
   spend(count * width);
   out.resize(count * width);
   for (size_t i = 0; i < count; i++) {
-    if (i % CHECK_EVERY == 0) {
+    if (i % ELEMENTS_A_CHECK == 0) {
       must(orb_context_check(ctx_));
     }
     const unsigned char *p = bytes.at + offset + i * stride;

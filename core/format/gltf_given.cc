@@ -14,7 +14,7 @@ namespace gltf {
 
 namespace {
 
-const size_t CHECK_EVERY = 4096; /* targets between two checks for cancellation */
+const size_t TARGETS_A_CHECK = 4096; /* targets between two checks for cancellation */
 
 struct Given {
   orb_context *ctx;
@@ -240,7 +240,7 @@ std::vector<std::string> target_names(const Given &given, size_t mesh, size_t co
   const cJSON *name = cJSON_IsArray(list) ? list->child : nullptr;
   std::vector<std::string> out;
   for (size_t k = 0; k < count; k++, name = name ? name->next : nullptr) {
-    if (k % CHECK_EVERY == 0) {
+    if (k % TARGETS_A_CHECK == 0) {
       must(orb_context_check(given.ctx));
     }
     bool is_text = cJSON_IsString(name) && *name->valuestring;
@@ -283,7 +283,7 @@ void read_targets(const Given &given, const orb_given_file &file, orb_given_targ
     const List targets = array_of(block->primitive, "targets");
     const std::vector<std::string> names = target_names(given, block->mesh, targets.size());
     for (size_t k = 0; k < targets.size(); k++) {
-      if (k % CHECK_EVERY == 0) {
+      if (k % TARGETS_A_CHECK == 0) {
         must(orb_context_check(given.ctx));
       }
       if (!known.count(names[k])) {

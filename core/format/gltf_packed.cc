@@ -7,7 +7,6 @@ namespace gltf {
 
 namespace {
 
-const char MESHOPT[] = "EXT_meshopt_compression", DRACO[] = "KHR_draco_mesh_compression";
 /* Compressed meshes are 3 to 30 times smaller; a run of equal bytes may be much more. */
 const size_t GROWTH_MAX = 200, SMALL = 1u << 20;
 

@@ -10,6 +10,9 @@
 
 namespace gltf {
 
+/* The names of the two extensions. */
+inline constexpr char MESHOPT[] = "EXT_meshopt_compression", DRACO[] = "KHR_draco_mesh_compression";
+
 /* The largest value of a component, which a normalized one calls 1; 1 for floats. */
 double component_most(int64_t type);
 

@@ -10,10 +10,10 @@ namespace gltf {
 using Matrices = std::vector<Matrix, Charged<Matrix>>;
 using Indices = std::vector<int64_t, Charged<int64_t>>;
 
-const size_t CHECK_EVERY = 4096; /* nodes or joints between two checks for cancellation */
+const size_t NODES_A_CHECK = 4096; /* nodes or joints between two checks for cancellation */
 
 inline void check_sometimes(orb_context *ctx, size_t step) {
-  if (step % CHECK_EVERY == 0) {
+  if (step % NODES_A_CHECK == 0) {
     must(orb_context_check(ctx));
   }
 }

@@ -10,8 +10,6 @@ namespace gltf {
 
 namespace {
 
-const char MESHOPT[] = "EXT_meshopt_compression", DRACO[] = "KHR_draco_mesh_compression";
-
 bool has_extension(const cJSON *object, const char *name) {
   return member(member(object, "extensions"), name) != nullptr;
 }

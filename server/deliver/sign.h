@@ -1,5 +1,5 @@
-/* Signatures of Standard Webhooks: "v1," and the base64 of the HMAC-SHA256 of "ID.TIMESTAMP.BODY". The key is what the
- * base64 after "whsec_" in the secret stands for. */
+/* Signatures of Standard Webhooks: "v1," and the base64 of the HMAC-SHA256 of "ID.TIMESTAMP.BODY". The key is the
+ * decoded base64 that follows "whsec_" in the secret. */
 #ifndef ORB_DELIVER_SIGN_H
 #define ORB_DELIVER_SIGN_H
 

@@ -8,13 +8,13 @@
  * then stays in use. Main thread only. */
 int certificate_load(const char *chain_path, const char *key_path);
 
-/* Does the service have a certificate? */
+/* Whether the service has a certificate. */
 int certificate_is_loaded(void);
 
 /* For MHD_OPTION_HTTPS_CERT_CALLBACK2: a gnutls_certificate_retrieve_function3. */
 void *certificate_callback(void);
 
-/* Frees all that were loaded. No handshake may run. */
+/* Frees all loaded certificates. No handshake may run. */
 void certificate_free(void);
 
 #endif

@@ -1,6 +1,6 @@
-/* Answers in memory, of what never changes: compressed descriptions, pages, assets and spheres, and small assets as
- * they are, by their strong ETag. Each is compressed once; the least recently sent are dropped first. Any thread may
- * use it.
+/* Answers that never change, kept in memory by their strong ETag: compressed descriptions, pages, assets and spheres,
+ * and small assets as they are. Each is compressed once; the least recently sent are dropped first. Any thread may use
+ * it.
  */
 #ifndef ORB_HTTP_ENCODED_H
 #define ORB_HTTP_ENCODED_H
@@ -18,7 +18,7 @@ void encoded_close(encoded_cache *c);          /* all references must have been 
 /* Adds a reference; NULL: not there. */
 const encoded *encoded_find(encoded_cache *c, const char *tag, coding which);
 /* Compresses what is not there yet, or copies it for CODING_NONE, and adds a reference; NULL: out of memory. bytes
- * NULL: remembers that it is not to be kept. */
+ * NULL: remembers that this answer is not kept. */
 const encoded *encoded_make(encoded_cache *c, const char *tag, coding which, const void *bytes, size_t size);
 void encoded_release(const encoded *e); /* NULL: nothing */
 

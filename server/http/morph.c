@@ -12,6 +12,7 @@
 #include "api/transfer_codec.h"
 #include "http/http.h"
 #include "metrics.h"
+#include "store/object_removal.h"
 
 enum { RECIPES = 4096, RECIPE_MOST = 1024, FAILURE_MS = 600000 };
 

@@ -9,6 +9,7 @@
 #include "http/disposition.h"
 #include "http/http.h"
 #include "log.h"
+#include "store/object_removal.h"
 #include "store/verify.h"
 
 enum { YEAR_S = 31536000 };

@@ -13,6 +13,7 @@
 #include "log.h"
 #include "orbmorph/profile.h"
 #include "store/keys.h"
+#include "store/object_removal.h"
 #include "store/owners.h"
 #include "store/verify.h"
 

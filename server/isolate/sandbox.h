@@ -27,7 +27,7 @@ typedef struct sandbox_limits {
 
 /* Compiles the filter of system calls, once, before processes are forked. 0: without one. */
 int sandbox_prepare(void);
-/* Confines the calling process for good. Returns which of SANDBOX_LANDLOCK and SANDBOX_SECCOMP hold. */
+/* Confines the calling process until it ends. Returns which of SANDBOX_LANDLOCK and SANDBOX_SECCOMP hold. */
 int sandbox_enter(const sandbox_limits *limits);
 
 #endif

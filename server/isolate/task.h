@@ -1,4 +1,4 @@
-/* What travels in the frames of channel.h. Texts in these structs are ended by a zero byte, on both sides by force. */
+/* The contents of the frames of channel.h. Both sides write a zero byte at the end of each text in these structs. */
 #ifndef ORB_ISOLATE_TASK_H
 #define ORB_ISOLATE_TASK_H
 
@@ -63,7 +63,7 @@ channel_result task_answer(int channel, done_head *done, const char *json, const
 /* The same, then ends the process. */
 _Noreturn void task_end(int channel, done_head *done, const char *json, const api_problem *problem);
 
-/* The daemon's side. Reads FRAME_DONE: json is of malloc() or NULL; a result that does not fit together is 0. */
+/* The daemon's side. Reads FRAME_DONE: json is allocated with malloc(), or NULL. 0: the result contradicts itself. */
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem);
 /* A limit on the processor time of a job with this many threads until its deadline. */
 int64_t task_cpu_seconds(int64_t deadline_ms, int threads);

@@ -1,8 +1,8 @@
 /* An HTTP client for URLs that callers name, on libcurl.
  *
  * It checks each address when it connects: libcurl asks it for the socket, and connects that socket to the address
- * that was checked. So a name that resolves to another address the second time (DNS rebinding) or a redirect does not
- * get past the check. Time and size are bounded. It uses no proxy, no cookies, no
+ * that was checked. So neither a name that later resolves to another address (DNS rebinding) nor a redirect
+ * passes the check. Time and size are bounded. It uses no proxy, no cookies, no
  * stored credentials, no connection of an earlier request, and follows no redirect by itself.
  */
 #ifndef ORB_NET_CLIENT_H
@@ -21,7 +21,7 @@ typedef struct net_request {
   const char *const *headers; /* "Name: value", NULL-terminated; NULL: none */
   const char *body;           /* of a POST; NULL: GET */
   size_t body_size;
-  int64_t total_ms; /* time limit of all */
+  int64_t total_ms; /* time limit of the whole request */
   int64_t most;     /* limit on the bytes of the answer's body */
   /* Takes bytes of the body of an answer 2xx; 0 ends the transfer. NULL: they are dropped. */
   int (*take)(void *user, const char *bytes, size_t size);
@@ -60,8 +60,8 @@ CURL *net_transfer_handle(const net_transfer *t);
 void net_transfer_end(net_transfer *t, CURLcode code, net_answer *out);
 void net_transfer_free(net_transfer *t);
 
-/* Gets the URL in this thread and follows redirects, at most so many; each must lead to a URL that net_url_read()
- * takes. All of it within request->total_ms. */
+/* Gets the URL in this thread and follows at most `redirects` redirects; each must lead to a URL that
+ * net_url_read() accepts. request->total_ms limits all of them together. */
 void net_get(const net_request *request, int redirects, net_answer *out);
 
 #endif

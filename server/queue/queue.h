@@ -17,9 +17,9 @@
  * queue_finish(), queue_give_back() and queue_put_off() in finish.c and queue_wait_for() in dependencies.c set
  * retry_at, before which schedule.c does not choose the job. After the job's process dies, queue_crashed() in finish.c
  * counts the death and queues the job again, until it has died CRASHES_MOST times. With isolate = off the daemon dies,
- * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts.
+ * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/recover.c counts.
  * With several nodes (shared.h), the others do that for a node whose lease expired: catalogue_recover_lost() in
- * store/jobs.c. New requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
+ * store/recover.c. New requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
  * authoritative: the queue shows a job as accepted, running or ended only after its row was committed, so everything a

@@ -1,6 +1,7 @@
 /* Kept alignments: an object (the bytes of orb_alignment_write()) and a row with its hash, named by all that the
- * alignment depends on (api_alignment_id()). A request that differs in remeshing or in the asset only takes it from
- * here. Nothing depends on them: they are evicted like embeddings, and one that is damaged is computed again. */
+ * alignment depends on (api_alignment_id()). A request that differs from an earlier one only in remeshing or in the
+ * asset reuses its alignment. Nothing depends on kept alignments: they are evicted like embeddings, and a damaged one
+ * is computed again. */
 #ifndef ORB_STORE_ALIGNMENTS_H
 #define ORB_STORE_ALIGNMENTS_H
 
@@ -16,8 +17,8 @@ int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const
 store_result alignments_publish(catalogue *cat, objects *store, const char *id, const char *tenant, const void *bytes,
                                 size_t size);
 
-/* Keeps an alignment of these shapes, unless the disk is nearly full. Failures are logged and have no consequence but
- * the time of another alignment. Blocks for a commit. */
+/* Keeps an alignment of these shapes, unless the disk is nearly full. Failures are logged; their only consequence is
+ * that a later request aligns again. Blocks for a commit. */
 void alignments_put(catalogue *cat, objects *store, orb_context *ctx, const char *id, const char *tenant,
                     const orb_align_shape *shapes, const orb_alignment *alignment);
 

@@ -1,7 +1,8 @@
-/* Objects in a bucket of S3, each with the SHA-256 of its bytes beside it, against which every read is checked.
+/* Objects in a bucket of S3. Each has the SHA-256 of its bytes as metadata, and every read is compared with it.
  *
- * While S3 does not answer, or refuses, every call fails at once with STORE_AWAY, and a thread asks each second whether
- * it is back. A bucket belongs to one deployment: an object of its prefix names it. Any thread may call any function.
+ * While S3 does not answer, or refuses, every call fails at once with STORE_AWAY, and a thread asks once a second
+ * whether it answers again. A bucket belongs to one deployment: an object of its prefix names it. Any thread may call
+ * any function.
  */
 #ifndef ORB_STORE_BUCKET_H
 #define ORB_STORE_BUCKET_H
@@ -15,15 +16,15 @@ typedef struct object_bucket object_bucket;
 
 typedef struct bucket_options {
   const char *url;         /* see net/s3_url.h */
-  const char *keys;        /* a file of keys, as the programs of AWS have it; "": the environment */
+  const char *keys;        /* a file of keys, in the format of the AWS tools; "": the environment */
   const char *authorities; /* PEM file; "": those of the system */
 } bucket_options;
 
-/* Reads who owns the bucket's prefix; "": nobody so far. Writes nothing. STORE_UNFIT: no bucket, or its keys are wrong;
- * STORE_AWAY: no answer. Both are logged. */
+/* Reads the owner of the bucket's prefix; "": it has none yet. Writes nothing. STORE_UNFIT: no bucket, or its keys are
+ * wrong; STORE_AWAY: no answer. Both are logged. */
 store_result bucket_open(const bucket_options *options, char owner[BUCKET_OWNER + 1], object_bucket **out);
 void bucket_close(object_bucket *b);
-/* Makes the prefix belong to `owner`. STORE_UNFIT: another one was faster; logged. */
+/* Makes the prefix belong to `owner`. STORE_UNFIT: another deployment has claimed it; logged. */
 store_result bucket_claim(object_bucket *b, const char *owner);
 
 /* Uploads a whole file. */

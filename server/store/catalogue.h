@@ -7,14 +7,16 @@
  *   owners.h      which tenant owns which row
  *   tokens.h      the tokens
  *   sql.h         statements over a database; its drivers are sqlite.c and postgresql.c
- *   postgresql_schema.c   the schema in PostgreSQL
+ *   postgresql_connection.c, postgresql_schema.c   a connection to PostgreSQL, and the schema there
  *   database.c    connections with prepared statements, the schema and its migrations
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
- *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row
+ *   resources.c, owners.c, jobs.c, events.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row
+ *   recover.c     jobs whose process or node ended
  *   lists.c       lists with a filter
  *   deliveries.c  the outbox: messages to webhooks that are not delivered yet
- *   objects.c     publishing, reading and deleting files
+ *   objects.c     publishing and reading objects
+ *   object_removal.c   deleting objects, quarantine, lost+found
  *   spheres.c     the file of aligned spheres
  *   alignments.c  kept alignments
  *   usage.c       what tenants use

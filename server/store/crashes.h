@@ -1,5 +1,5 @@
-/* Deaths of processes that ran alone in what they did, by the key of their work: of a job, or of a mesh that was
- * checked. They outlive the jobs, so that a file which kills its process cannot do so over and over. */
+/* Crashes of processes that did only one thing, counted by the key of that work: of a job, or of a checked mesh. The
+ * counts outlive the jobs, so a file that crashes its process is refused in the end. */
 #ifndef ORB_STORE_CRASHES_H
 #define ORB_STORE_CRASHES_H
 
@@ -19,7 +19,8 @@ int crash_check(database *db, const char *key);
 void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenant, int64_t now);
 /* Whether the work of this key is refused. */
 int catalogue_crashed(catalogue *cat, const char *key);
-/* Forgets the crashes of all keys that begin so, or of this tenant, or of work on this mesh. STORE_NOT_FOUND: none. */
+/* Forgets the crashes of all keys that begin with `name`, or of the tenant `name`, or of work on the mesh `name`.
+ * STORE_NOT_FOUND: none. */
 store_result catalogue_crash_clear(catalogue *cat, const char *name);
 /* Appends a line for each key, the latest first; −1: it cannot be read. */
 int catalogue_crash_list(catalogue *cat, api_text *out);

@@ -1,4 +1,4 @@
-/* Rows of jobs and events. */
+/* Rows of jobs. */
 #include <stdlib.h>
 
 #include "store/crashes.h"
@@ -6,8 +6,6 @@
 #include "store/owners.h"
 #include "store/rows.h"
 #include "store/usage.h"
-
-#define COLUMNS JOB_COLUMNS
 
 void job_row_free(job_row *row) {
   free(row->request);
@@ -65,12 +63,11 @@ store_result catalogue_job_insert(catalogue *cat, job_row *row, const job_webhoo
 }
 
 typedef struct change {
-  const char *id, *problem;
+  const char *id;
   int attempt, alone, counts;
   const job_row *row;
   int64_t now;
   const job_end *end;
-  const char *node; /* of several */
 } change;
 
 /* Runs an update that must change exactly one row. */
@@ -146,21 +143,6 @@ store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int count
   return catalogue_write(cat, crashed, &c);
 }
 
-static int write_event(database *db, const char *job, int64_t number, const char *type, const char *json) {
-  sql_statement *st =
-      database_statement(db,
-                         "INSERT INTO event(job, number, type, json) VALUES(?1,?2,?3,?4)"
-                         " ON CONFLICT(job, number) DO UPDATE SET type=excluded.type, json=excluded.json");
-  if (!st) {
-    return SQL_ERROR;
-  }
-  sql_bind_text(st, 1, job);
-  sql_bind_integer(st, 2, number);
-  sql_bind_text(st, 3, type);
-  sql_bind_text(st, 4, json);
-  return database_run(db, st);
-}
-
 static int finish(database *db, void *arg) {
   const change *c = arg;
   const job_end *end = c->end;
@@ -186,7 +168,7 @@ static int finish(database *db, void *arg) {
     code = usage_add_time(db, end->owner, end->worker_ms);
   }
   if (code == SQL_OK && end->event_json) {
-    code = write_event(db, c->id, end->event, api_job_state_name(end->state), end->event_json);
+    code = event_insert(db, c->id, end->event, api_job_state_name(end->state), end->event_json);
   }
   if (code == SQL_OK && end->event_json) {
     code = delivery_announce(db, c->id, end->state, end->event_json, end->now);
@@ -232,7 +214,7 @@ const row_kind job_rows = {read_row, release_row, sizeof(job_row)};
 
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   database *db = catalogue_reader(cat);
-  sql_statement *st = database_statement(db, database_either(db, "SELECT " COLUMNS " FROM job WHERE id=?1",
+  sql_statement *st = database_statement(db, database_either(db, "SELECT " JOB_COLUMNS " FROM job WHERE id=?1",
                                                              "SELECT " JOB_COLUMNS_SHOWN " FROM job WHERE id=?1"));
   if (st) {
     sql_bind_text(st, 1, id);
@@ -248,10 +230,10 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
 int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,
                        job_row *out) {
   static const char *const queries[2][2] = {
-      {"SELECT " COLUMNS LISTED "seq<?2 ORDER BY seq DESC LIMIT ?3",
-       "SELECT " COLUMNS LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
-      {"SELECT " COLUMNS LISTED NAMED("+seq") " ORDER BY +seq DESC LIMIT ?3",
-       "SELECT " COLUMNS LISTED NAMED("+seq") " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
+      {"SELECT " JOB_COLUMNS LISTED "seq<?2 ORDER BY seq DESC LIMIT ?3",
+       "SELECT " JOB_COLUMNS LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
+      {"SELECT " JOB_COLUMNS LISTED NAMED("+seq") " ORDER BY +seq DESC LIMIT ?3",
+       "SELECT " JOB_COLUMNS LISTED NAMED("+seq") " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
   static const char *const plain[2][2] = {
       {"SELECT " JOB_COLUMNS_SHOWN LISTED "seq<?2 ORDER BY seq DESC LIMIT ?3",
        "SELECT " JOB_COLUMNS_SHOWN LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
@@ -277,157 +259,12 @@ int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, in
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out) {
   database *db = catalogue_reader(cat);
   sql_statement *st =
-      database_statement(db, "SELECT " COLUMNS " FROM job WHERE state<2 AND seq>?1 ORDER BY seq LIMIT ?2");
+      database_statement(db, "SELECT " JOB_COLUMNS " FROM job WHERE state<2 AND seq>?1 ORDER BY seq LIMIT ?2");
   if (st) {
     sql_bind_integer(st, 1, after);
     sql_bind_integer(st, 2, limit);
   }
   return rows_many(cat, db, st, &job_rows, out, limit);
-}
-
-/* Fails a job that crashed alone too often, and writes its final event for clients that follow it. */
-static int give_up(database *db, job_row *row, const change *c) {
-  api_text json = {0};
-  int64_t number = 0;
-  row->state = API_JOB_FAILED;
-  api_job_write(&(api_job_view){.id = row->id,
-                                .result = row->key,
-                                .problem = c->problem,
-                                .kind = row->kind,
-                                .state = row->state,
-                                .attempt = row->attempt,
-                                .created = row->created,
-                                .started = row->started,
-                                .finished = c->now},
-                &json);
-  sql_statement *st = database_statement(db, "SELECT coalesce(max(number), 0) + 1 FROM event WHERE job=?1");
-  if (!st || json.failed) {
-    api_text_free(&json);
-    return SQL_NOMEM;
-  }
-  sql_bind_text(st, 1, row->id);
-  int code = sql_step(st);
-  number = code == SQL_ROW ? sql_integer(st, 0) : 0;
-  sql_reset(st);
-  code = code == SQL_ROW ? write_event(db, row->id, number, api_job_state_name(row->state), json.data) : code;
-  code = code == SQL_OK ? delivery_announce(db, row->id, row->state, json.data, c->now) : code;
-  api_text_free(&json);
-  if (code == SQL_OK) {
-    st = database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3");
-    if (!st) {
-      return SQL_ERROR;
-    }
-    sql_bind_text(st, 1, c->problem);
-    sql_bind_integer(st, 2, c->now);
-    sql_bind_text(st, 3, row->id);
-    code = database_run(db, st);
-  }
-  return code;
-}
-
-/* Fails the queued jobs that have crashed alone too often; rarely more than one. */
-static int give_up_all(database *db, const change *c) {
-  for (;;) {
-    job_row row;
-    sql_statement *st =
-        database_statement(db, "SELECT " COLUMNS " FROM job WHERE state=0 AND crashes>=?1 ORDER BY seq LIMIT 1");
-    if (!st) {
-      return SQL_ERROR;
-    }
-    sql_bind_integer(st, 1, c->attempt);
-    int code = sql_step(st);
-    if (code == SQL_DONE) {
-      sql_reset(st);
-      return SQL_OK;
-    }
-    if (code == SQL_ROW) {
-      code = read_row(st, &row) ? SQL_OK : SQL_NOMEM;
-      if (code != SQL_OK) {
-        job_row_free(&row);
-      }
-    }
-    sql_reset(st);
-    if (code == SQL_OK) {
-      code = give_up(db, &row, c);
-      job_row_free(&row);
-    }
-    if (code != SQL_OK) {
-      return code;
-    }
-  }
-}
-
-/* Retry after a crash: jobs that were running are queued again as suspects. A crash counts against a job only if it ran
- * alone, on purpose or because no other job was running. */
-static int recover(database *db, void *arg) {
-  const change *c = arg;
-  if (c->attempt == 0) {
-    return database_run(db, database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1"));
-  }
-  sql_statement *st = database_statement(db,
-                                         "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
-                                         " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");
-  int code = database_run(db, st);
-  if (code == SQL_OK) {
-    code = database_run(db, database_statement(db, "UPDATE job SET state=0, suspect=1, alone=0 WHERE state=1"));
-  }
-  return code == SQL_OK ? give_up_all(db, c) : code;
-}
-
-/* The jobs of this node's last life: its end was not theirs, as they have processes of their own. Those of other nodes
- * that are gone: they may have been the cause, but for downloads. */
-static int recover_lost(database *db, void *arg) {
-  const change *c = arg;
-  sql_statement *st = database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1 AND node=?1 AND node<>''");
-  int code = SQL_ERROR;
-  if (st) {
-    sql_bind_text(st, 1, c->node);
-    code = database_run(db, st);
-  }
-  if (code != SQL_OK || !c->counts) {
-    return code;
-  }
-  st = code == SQL_OK
-           ? database_statement(db,
-                                "UPDATE job SET state=0, crashes=crashes+alone, alone=0,"
-                                " suspect=CASE kind WHEN 2 THEN 0 ELSE 1 END"
-                                " WHERE state=1 AND node NOT IN (SELECT name FROM node WHERE until>=clock_ms())")
-           : NULL;
-  code = st ? database_run(db, st) : code;
-  if (code == SQL_OK && sql_changes(db) > 0) {
-    log_warn("jobs of a node that was silent beyond its lease are queued again");
-  }
-  st = code == SQL_OK ? database_statement(db, "DELETE FROM node WHERE until<clock_ms() OR name=?1") : NULL;
-  if (st) {
-    sql_bind_text(st, 1, c->node);
-    code = database_run(db, st);
-  }
-  return code == SQL_OK ? give_up_all(db, c) : code;
-}
-
-store_result catalogue_recover_own(catalogue *cat, const char *last_life) {
-  change c = {.node = last_life};
-  return catalogue_write(cat, recover_lost, &c);
-}
-
-typedef struct lost_arg {
-  change change; /* first */
-  char problem[];
-} lost_arg;
-
-void catalogue_recover_lost(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem) {
-  size_t size = strlen(crash_problem) + 1;
-  lost_arg *a = calloc(1, sizeof *a + size);
-  if (a) {
-    memcpy(a->problem, crash_problem, size);
-    a->change = (change){.node = "", .counts = 1, .attempt = most_crashes, .now = now, .problem = a->problem};
-    catalogue_write_later(cat, recover_lost, a);
-  }
-}
-
-store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem) {
-  change c = {.attempt = most_crashes, .now = now, .problem = crash_problem};
-  return catalogue_write(cat, recover, &c);
 }
 
 int64_t catalogue_jobs_ended(catalogue *cat) {
@@ -461,51 +298,4 @@ static int forget(database *db, void *arg) {
 
 store_result catalogue_jobs_forget(catalogue *cat, int count) {
   return catalogue_write(cat, forget, &count);
-}
-
-typedef struct event_arg {
-  char job[API_JOB_ID_SIZE], type[16];
-  int64_t number;
-  char json[];
-} event_arg;
-
-static int put_event(database *db, void *arg) {
-  const event_arg *e = arg;
-  return write_event(db, e->job, e->number, e->type, e->json);
-}
-
-void catalogue_event(catalogue *cat, const char *job, int64_t number, const char *type, const char *json) {
-  size_t size = strlen(json) + 1;
-  event_arg *e = calloc(1, sizeof *e + size);
-  if (e) {
-    snprintf(e->job, sizeof e->job, "%s", job);
-    snprintf(e->type, sizeof e->type, "%s", type);
-    e->number = number;
-    memcpy(e->json, json, size);
-    catalogue_write_later(cat, put_event, e);
-  }
-}
-
-static int read_event(sql_statement *st, void *to) {
-  event_row *out = to;
-  out->number = sql_integer(st, 0);
-  row_text(st, 1, out->type, sizeof out->type);
-  out->json = row_copy(st, 2);
-  return out->json != NULL;
-}
-static void release_event(void *row) {
-  free(((event_row *)row)->json);
-}
-static const row_kind event_rows = {read_event, release_event, sizeof(event_row)};
-
-int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, event_row *out) {
-  database *db = catalogue_reader(cat);
-  sql_statement *st = database_statement(
-      db, "SELECT number, type, json FROM event WHERE job=?1 AND number>?2 ORDER BY number LIMIT ?3");
-  if (st) {
-    sql_bind_text(st, 1, job);
-    sql_bind_integer(st, 2, after);
-    sql_bind_integer(st, 3, limit);
-  }
-  return rows_many(cat, db, st, &event_rows, out, limit);
 }

@@ -1,5 +1,5 @@
-/* Signing keys: who may sign URLs. The catalogue stores their secrets as they are, because the daemon has to compute
- * the same signatures. What a key has used is counted by day (UTC), so its limits hold over a restart. */
+/* Signing keys, whose holders may sign URLs. The catalogue stores their secrets as they are, because the daemon has to
+ * compute the same signatures. The catalogue counts what a key uses each day (UTC), so its limits survive a restart. */
 #ifndef ORB_STORE_KEYS_H
 #define ORB_STORE_KEYS_H
 
@@ -11,7 +11,7 @@ typedef struct key_row {
   char name[KEY_NAME];
   char tenant[64];                                 /* whose meshes its URLs name, and who owns what they make */
   char secret[KEY_SECRET], old_secret[KEY_SECRET]; /* 64 hexadecimal digits; old_secret "": none */
-  int64_t old_until;                               /* Unix time in seconds to which the old secret is valid */
+  int64_t old_until;                               /* Unix time in seconds until which the old secret is valid */
   char origins[KEY_ORIGINS];                       /* comma-separated; "": all */
   int64_t requests, cpu_seconds;                   /* limits a day; 0: none */
   int64_t created;                                 /* Unix time in ms */

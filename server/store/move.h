@@ -2,9 +2,9 @@
  * SQLite or PostgreSQL and objects in files or S3.
  *
  * Until the end, no daemon starts on the target: its catalogue has the mark of store/move_mark.h, its bucket an owner
- * that begins with PLACE_MIGRATING. Both name the source, so that a move that was killed goes on, and a target that
- * holds anything else is refused before anything is written. The source is only read, except that its schema is
- * brought up to date. */
+ * that begins with PLACE_MIGRATING. Both name the source. So a move that was killed can continue, and a target that
+ * holds anything else is refused before anything is written. The move only reads the source, except that it brings its
+ * schema up to date. */
 #ifndef ORB_STORE_MOVE_H
 #define ORB_STORE_MOVE_H
 
@@ -26,7 +26,7 @@ typedef struct move_listener {
   void *user;
 } move_listener;
 
-/* Whether an earlier move of the same deployment has begun here. */
+/* Whether this continues an earlier move of the same deployment. */
 int move_goes_on(const move *m);
 /* Copies all, and removes the mark. STORE_CONFLICT: counts->wrong objects of the source are damaged or missing; all
  * others are copied, and the mark stays. */

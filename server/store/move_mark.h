@@ -1,5 +1,5 @@
-/* The mark of a catalogue that `orbmorphd migrate` has begun to fill: a table, so that no daemon of any data folder
- * takes the half of a deployment for the whole. It names whose half it is (place_hash()). */
+/* The mark of a catalogue that `orbmorphd migrate` has begun to fill. It is a table, so every daemon, on whichever data
+ * folder, recognises an incomplete deployment. It names the source (place_hash()). */
 #ifndef ORB_STORE_MOVE_MARK_H
 #define ORB_STORE_MOVE_MARK_H
 

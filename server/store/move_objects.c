@@ -11,6 +11,7 @@
 
 #include "faults.h"
 #include "log.h"
+#include "store/object_removal.h"
 #include "store/rows.h"
 #include "store/spheres.h"
 

@@ -18,6 +18,7 @@
 
 #include "store/bucket.h"
 #include "store/object_files.h"
+#include "store/objects_remote.h"
 #include "store/result.h"
 
 typedef struct objects objects;
@@ -29,13 +30,7 @@ store_result objects_open_bucket(const char *data, object_bucket *b, uint64_t mo
 /* For reading objects only; changes nothing. */
 store_result objects_open_read_only(const char *data, objects **out);
 
-/* A store for a process that has no files: temporary files lie in memory, and these functions take what is published
- * and give what is read. publish: the descriptor stays the caller's. */
-typedef struct objects_remote {
-  store_result (*publish)(void *user, object_kind kind, const char *id, int fd);
-  store_result (*read)(void *user, object_kind kind, const char *id, int *fd, uint64_t *size);
-  void *user;
-} objects_remote;
+/* A store for a process that has no files. */
 store_result objects_open_remote(const objects_remote *remote, objects **out);
 void objects_close(objects *store);
 
@@ -93,38 +88,12 @@ void objects_path(const objects *store, object_kind kind, const char *id, char o
 /* Makes the folder of that file, if it is not there. */
 store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
-/* Deletes an object that no row names; called while others are excluded. While a backup runs, S3 is unreachable, or
- * others are excluded no more, it stays until objects_delete_held(). */
-store_result objects_delete(objects *store, object_kind kind, const char *id);
-/* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named:
- * whether a row names the object again; called while other threads are excluded. After a restart of the process the
- * files stay until --gc. */
-void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user);
 /* Opens the lock file of backups. A backup holds it exclusively (flock()), so the kernel releases it with the process;
  * a thread that deletes an object shares it for that moment. −1 with the reason logged. */
 int objects_backup_lock(const char *data);
-int objects_backup_runs(objects *store);
-/* Keeps backups waiting until objects_close(), so that nothing that this process deletes is held. 0: a backup runs. */
-int objects_hold_backups(objects *store);
-
-/* For --gc: an object without a row may be all that is left of a row that the catalogue lost, so it goes to the folder
- * lost+found first, and is deleted after a while. Called while others are excluded. */
-store_result objects_set_aside(objects *store, object_kind kind, const char *id);
-/* Deletes what was set aside before a Unix time in seconds. Returns the number of files. */
-long objects_purge_lost(objects *store, int64_t before);
-
 /* For store/verify.h: marks of verified objects, in memory. */
 void objects_mark(objects *store, object_kind kind, const char *id);
 int objects_is_marked(const objects *store, object_kind kind, const char *id);
-/* Moves a wrong object, which was read through fd, out of the store. STORE_NOT_FOUND: done; STORE_OK: it has been
- * replaced meanwhile. */
-store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd);
-/* `heal` is called after each object that was moved to quarantine, on the thread that found it, which holds no lock. */
-void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user);
-/* Waits until `heal` has returned for every object that is in quarantine now. A caller that finds a row without its
- * object calls this and reads the row again, because a thread may be about to delete it. Blocks; not within `heal`. */
-void objects_settle(objects *store);
-
 /* Whether the file system is mounted read-only, as the kernel does after errors of the disk. */
 int objects_is_read_only(const objects *store);
 /* Free bytes of the file system, for disk-reserve. */

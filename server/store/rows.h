@@ -1,4 +1,4 @@
-/* Reading rows, shared by resources.c, owners.c, jobs.c, keys.c and tokens.c. */
+/* Reading rows, shared by the files with the SQL of a kind of row (list in catalogue.h). */
 #ifndef ORB_STORE_ROWS_H
 #define ORB_STORE_ROWS_H
 
@@ -10,6 +10,7 @@
 #include "store/transactions.h"
 
 /* These run inside a transaction of the writer. */
+int event_insert(database *db, const char *job, int64_t number, const char *type, const char *json);
 int resource_insert(database *db, const resource *r);                       /* keeps an existing row */
 int resource_remove(database *db, resource_kind kind, const char *id);      /* SQL_NOTFOUND: no such row */
 int job_insert(database *db, job_row *row, const struct job_webhook *hook); /* sets row->seq; hook NULL: none */

@@ -1,5 +1,5 @@
-/* A bucket with a folder of verified copies before it: what store/objects.h needs of S3. Names are paths in both, such
- * as mesh/ab/abcd…. Any thread may call any function. */
+/* A bucket, and a folder that caches verified copies of its objects: what store/objects.h needs of S3. Names are paths
+ * in both, such as mesh/ab/abcd…. Any thread may call any function. */
 #ifndef ORB_STORE_VAULT_H
 #define ORB_STORE_VAULT_H
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "api/ids.h"
+#include "store/object_removal.h"
 #include "store/spheres.h"
 
 int verify_is_done(const objects *store, object_kind kind, const char *id) {

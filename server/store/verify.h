@@ -1,7 +1,7 @@
-/* Objects against their hashes: each once after a start, before it is first served, whenever a job found one wrong, and
- * in each scrub. An object that does not match is quarantined: moved to the folder `quarantine` of the data folder, not
- * deleted. The store then lacks it: an upload restores a mesh, and what a job can make again loses its row
- * (evict_damaged()), so that the next request makes it again. */
+/* Compares objects with their hashes: once after each start, before an object is first served; whenever a job finds one
+ * wrong; and in each scrub. An object that does not match is quarantined: moved to the folder `quarantine` of the data
+ * folder, not deleted. The store then lacks it: a new upload restores a mesh; a result loses its row (evict_damaged()),
+ * so the next request makes it again. */
 #ifndef ORB_STORE_VERIFY_H
 #define ORB_STORE_VERIFY_H
 

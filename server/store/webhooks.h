@@ -1,5 +1,5 @@
-/* Webhooks: where a tenant's jobs are announced, and the secrets that sign the messages. The catalogue stores secrets
- * as they are, because the daemon has to compute signatures.
+/* Webhooks: the URLs to which the ends of a tenant's jobs are announced, and the secrets that sign the messages. The
+ * catalogue stores secrets as they are, because the daemon has to compute signatures.
  *
  * A tenant's own secret, which signs the webhooks that its requests name, is a row with the name "@" and the tenant,
  * and without a URL.

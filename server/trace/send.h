@@ -1,5 +1,5 @@
-/* Sends spans to a collector: OTLP over HTTP in its JSON form, in batches, from one thread. Nobody waits for it: what
- * does not fit into its bounded buffer is dropped and counted. */
+/* Sends spans to a collector: OTLP over HTTP in its JSON form, in batches, from one thread. No caller waits for
+ * it: spans that do not fit into its bounded buffer are dropped and counted. */
 #ifndef ORB_TRACE_SEND_H
 #define ORB_TRACE_SEND_H
 

@@ -1,4 +1,4 @@
-/* A job within a process of its own: what run_embedding.c and run_supermesh.c do there with inputs from the channel. */
+/* Runs a job in a process of its own, which gets its inputs from the channel. */
 #ifndef ORB_WORKER_CONFINED_H
 #define ORB_WORKER_CONFINED_H
 

@@ -13,6 +13,7 @@
 #include "isolate/task.h"
 #include "log.h"
 #include "store/alignments.h"
+#include "store/object_removal.h"
 #include "store/verify.h"
 
 enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, COPY_BYTES = 16 << 20 };

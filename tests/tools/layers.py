@@ -65,21 +65,22 @@ def add_includes(files, arrows):
 
 
 def add_calls(build, arrows):
-    defined, used = {}, collections.defaultdict(set)
+    objects = {}
     for item in pathlib.Path(build).rglob("*.o"):
         found = re.search(r"/(core|api|server|client)/CMakeFiles/[^/]+\.dir/(.*)\.o$", str(item))
         file = f"{found[1]}/{found[2]}" if found else ""
-        if not found or not (ROOT / file).is_file():
+        if found and (ROOT / file).is_file():
+            objects[str(item)] = unit(file)
+    # One nm for all: it loads the linker's plugins each time it starts, which takes longer than reading an object.
+    names = subprocess.run(["nm", "-A", "-g", *objects], capture_output=True, text=True, check=True).stdout if objects else ""
+    defined, used = {}, collections.defaultdict(set)
+    for item, kind, name in re.findall(r"^(.*):(?:[0-9a-f]+| +) (\w) (\S+)$", names, re.MULTILINE):
+        if name in IN_PLACE_OF_LIBC:
             continue
-        names = subprocess.run(["nm", item], capture_output=True, text=True, check=True).stdout
-        for line in names.splitlines():
-            kind, name = line.split()[-2:]
-            if name in IN_PLACE_OF_LIBC:
-                continue
-            if kind in "TDBRVWC":
-                defined.setdefault(name, unit(file))
-            elif kind == "U":
-                used[unit(file)].add(name)
+        if kind in "TDBRVWC":
+            defined.setdefault(name, objects[item])
+        elif kind == "U":
+            used[objects[item]].add(name)
     for one, names in used.items():
         for name in names:
             if defined.get(name, one) != one:

@@ -14,6 +14,7 @@
 #include <cmocka.h>
 
 #include "store/catalogue.h"
+#include "store/object_removal.h"
 #include "store/owners.h"
 #include "store/tokens.h"
 #include "store/transactions.h"

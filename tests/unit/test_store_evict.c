@@ -16,6 +16,7 @@
 
 #include "evict.h"
 #include "log.h"
+#include "store/object_removal.h"
 #include "store/owners.h"
 
 enum { NEEDED = 150, FREE = 150, ROW_BYTES = 10 };

@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "store/move.h"
+#include "store/object_removal.h"
 #include "store/owners.h"
 
 enum { MESHES = 230 }; /* more than a batch of rows, and than a page of objects */

@@ -1,5 +1,6 @@
 /* Reads request bodies and writes documents while memory runs out: each ends with an out-of-memory error or correctly.
  */
+#include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -95,7 +96,7 @@ static void torture_body(body *b) {
   api_problem_free(&problem);
   api_text_free(&out);
   for (int for_ever = 0; for_ever < 2; for_ever++) {
-    long failures = torture(read_body, b, TORTURE_ALLOC, for_ever, 1);
+    long failures = torture(read_body, b, TORTURE_ALLOC, for_ever, 1, LONG_MAX, 1);
     print_message("%ld allocations failed, %s\n", failures, for_ever ? "for ever" : "once");
     assert_true(failures >= 10);
   }

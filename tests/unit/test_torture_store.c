@@ -1,5 +1,6 @@
 /* The store while memory, files, SQLite and threads fail: everything that it reported as done exists, also after a
  * restart; it reports every failure; afterwards it works. */
+#include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -233,7 +234,7 @@ static int one_start(void *user, torture_kind kind, long number, int for_ever) {
 static void all_ways(stored *s, torture_run run, torture_kind kind, int step, long least) {
   static const char *const names[] = {"allocations", "calls of SQLite", "calls of files", "starts of threads"};
   for (int for_ever = 0; for_ever < 2; for_ever++) {
-    long failures = torture(run, s, kind, for_ever, step);
+    long failures = torture(run, s, kind, for_ever, 1, LONG_MAX, step);
     print_message("%ld %s failed, %s\n", failures, names[kind], for_ever ? "for ever" : "once");
     assert_true(failures >= least);
   }

@@ -46,12 +46,16 @@ int torture_disarm(void) {
   return atomic_load(&met);
 }
 
-long torture(torture_run run, void *user, torture_kind kind, int for_ever, int step) {
-  long number = 1;
-  while (run(user, kind, number, for_ever)) {
+long torture_count(void) {
+  return atomic_load(&passed);
+}
+
+long torture(torture_run run, void *user, torture_kind kind, int for_ever, long first, long last, int step) {
+  long number = first;
+  while (number <= last && run(user, kind, number, for_ever)) {
     number += step;
   }
-  return (number - 1) / step;
+  return (number - first) / step;
 }
 
 static void *sqlite_malloc(int size) {

@@ -18,10 +18,11 @@ void torture_begin(void);
 /* A run works between torture_arm() and torture_disarm() and then checks the result. */
 void torture_arm(torture_kind kind, long number, int for_ever);
 int torture_disarm(void); /* returns whether a call failed */
+long torture_count(void); /* calls of the kind since torture_arm() */
 
-/* run(user, kind, number, for_ever) returns the result of torture_disarm(). Returns the number of runs with a failure.
- */
+/* run(user, kind, number, for_ever) returns the result of torture_disarm(). The runs fail the calls `first`, `first` +
+ * `step` … up to `last` at most, and end when one meets no failure. Returns the number of runs with a failure. */
 typedef int (*torture_run)(void *user, torture_kind kind, long number, int for_ever);
-long torture(torture_run run, void *user, torture_kind kind, int for_ever, int step); /* step: of the numbers */
+long torture(torture_run run, void *user, torture_kind kind, int for_ever, long first, long last, int step);
 
 #endif

@@ -1,0 +1,41 @@
+/* One connection to PostgreSQL: opened, locked for writing, and made again after it was lost. postgresql.c uses it.
+ *
+ * The connection that writes holds an advisory lock, one for each schema, so that one daemon alone works on a
+ * catalogue, as the lock of the data folder ensures for SQLite. A lost connection loses the lock. The daemon gets the
+ * lock back only if no other daemon has held it meanwhile, which the number `holder` of the catalogue shows. */
+#ifndef ORB_STORE_POSTGRESQL_CONNECTION_H
+#define ORB_STORE_POSTGRESQL_CONNECTION_H
+
+#include <libpq-fe.h>
+#include <stdint.h>
+
+typedef struct pgsql_connection {
+  PGconn *server;
+  int writer, out_of_memory;
+  int generation; /* counts connections: statements are prepared again on each */
+  int statements; /* counts them, for their names */
+  int64_t changes, holder;
+  char message[400]; /* of the last error */
+} pgsql_connection;
+
+/* The functions return codes of sql.h. */
+
+/* writer: see sql_driver.open. *out: the caller closes it, also after a failure; NULL if out of memory. */
+int pgsql_open(const char *where, int writer, pgsql_connection **out);
+void pgsql_close(pgsql_connection *c);
+/* As sql_driver.hold. */
+int pgsql_hold(pgsql_connection *c);
+
+/* Runs one or several statements without parameters. *value: the integer in the first row of the last one; NULL: the
+ * caller does not want it. */
+int pgsql_run(pgsql_connection *c, const char *sql, int64_t *value);
+int pgsql_is_fine(const PGresult *result);
+/* Notes the error of a result (NULL: of the connection) and returns its code. */
+int pgsql_failed(pgsql_connection *c, const PGresult *result);
+
+int pgsql_is_lost(const pgsql_connection *c);
+int pgsql_is_within(const pgsql_connection *c); /* a transaction */
+/* Connects again if the connection was lost. Not within a transaction, whose begin would be lost, too. */
+int pgsql_restore(pgsql_connection *c);
+
+#endif
