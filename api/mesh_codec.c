@@ -1,6 +1,5 @@
 #include "api/mesh_codec.h"
 
-#include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -254,14 +253,17 @@ static int get_count(const cJSON *object, const char *name, int64_t *out) {
   return fine;
 }
 
+int api_mesh_summary_of(const cJSON *object, api_mesh_summary *out) {
+  return get_text(object, "name", out->name, sizeof out->name) &&
+         get_text(object, "format", out->format, sizeof out->format) &&
+         get_text(object, "repair", out->repair, sizeof out->repair) && get_count(object, "vertices", &out->vertices) &&
+         get_count(object, "triangles", &out->triangles) && get_count(object, "file_vertices", &out->file_vertices) &&
+         get_count(object, "file_triangles", &out->file_triangles);
+}
+
 int api_mesh_summarise(const char *json, api_mesh_summary *out) {
   cJSON *object = cJSON_Parse(json);
-  int fine = get_text(object, "name", out->name, sizeof out->name) &&
-             get_text(object, "format", out->format, sizeof out->format) &&
-             get_text(object, "repair", out->repair, sizeof out->repair) &&
-             get_count(object, "vertices", &out->vertices) && get_count(object, "triangles", &out->triangles) &&
-             get_count(object, "file_vertices", &out->file_vertices) &&
-             get_count(object, "file_triangles", &out->file_triangles);
+  int fine = api_mesh_summary_of(object, out);
   cJSON_Delete(object);
   return fine;
 }

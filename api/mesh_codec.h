@@ -2,6 +2,8 @@
 #ifndef ORB_API_MESH_CODEC_H
 #define ORB_API_MESH_CODEC_H
 
+#include <cjson/cJSON.h>
+
 #include "api/ids.h"
 #include "api/problem.h"
 #include "orbmorph/format.h"
@@ -42,5 +44,6 @@ typedef struct api_mesh_summary {
 } api_mesh_summary;
 /* Returns 1, or 0 if the text does not decode. */
 int api_mesh_summarise(const char *json, api_mesh_summary *out);
+int api_mesh_summary_of(const cJSON *description, api_mesh_summary *out);
 
 #endif

@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "orbmorph/utf8.h"
 
@@ -51,17 +50,23 @@ void api_text_add(api_text *text, const char *string) {
   api_text_append(text, string, strlen(string));
 }
 
+/* Formats a second time only what the room does not hold. */
 void api_text_printf(api_text *text, const char *format, ...) {
   va_list args, again;
   va_start(args, format);
   va_copy(again, args);
-  int length = vsnprintf(NULL, 0, format, args);
+  const size_t room = text->failed ? 0 : text->capacity - text->size;
+  int length = vsnprintf(room ? text->data + text->size : NULL, room, format, args);
   va_end(args);
   if (length < 0) {
     text->failed = 1;
+  } else if ((size_t)length < room) {
+    text->size += (size_t)length;
   } else if (reserve(text, (size_t)length)) {
     vsnprintf(text->data + text->size, (size_t)length + 1, format, again);
     text->size += (size_t)length;
+  } else if (room) {
+    text->data[text->size] = 0;
   }
   va_end(again);
 }
@@ -89,7 +94,7 @@ static void quoted(api_text *text, const char *s) {
   const char *run = s;
   for (size_t n; *s; s += n) {
     unsigned char c = (unsigned char)*s;
-    size_t whole = orb_utf8_length((const unsigned char *)s, 4);
+    size_t whole = c < 0x80 ? 1 : orb_utf8_length((const unsigned char *)s, 4);
     n = whole ? whole : 1;
     if (whole && c >= 0x20 && c != '"' && c != '\\') {
       continue;
@@ -121,10 +126,32 @@ void api_json_string(api_text *text, const char *utf8) {
   quoted(text, utf8);
 }
 
+/* Writes a number of at least so many digits in front of `end`; returns where it begins. */
+static char *digits_before(char *end, uint64_t value, int least) {
+  for (; value > 0 || least > 0; value /= 10, least--) {
+    *--end = (char)('0' + value % 10);
+  }
+  return end;
+}
+
+static void add_integer(api_text *text, int64_t value) {
+  char room[24], *const end = room + sizeof room;
+  char *begin = digits_before(end, value < 0 ? 0 - (uint64_t)value : (uint64_t)value, 1);
+  if (value < 0) {
+    *--begin = '-';
+  }
+  api_text_append(text, begin, (size_t)(end - begin));
+}
+
 void api_json_number(api_text *text, double value) {
   separate(text);
   if (!isfinite(value)) {
     api_text_add(text, "null");
+    return;
+  }
+  /* Fifteen digits hold such a number, so %.15g writes it without an exponent too. */
+  if (fabs(value) < 1e15 && value == (double)(int64_t)value && !(value == 0 && signbit(value))) {
+    add_integer(text, (int64_t)value);
     return;
   }
   char digits[40];
@@ -139,7 +166,7 @@ void api_json_number(api_text *text, double value) {
 
 void api_json_integer(api_text *text, int64_t value) {
   separate(text);
-  api_text_printf(text, "%lld", (long long)value);
+  add_integer(text, value);
 }
 
 void api_json_bool(api_text *text, int value) {
@@ -178,17 +205,37 @@ void api_json_member_raw(api_text *text, const char *name, const char *json) {
   api_json_raw(text, json);
 }
 
+/* Writes the date of a day since 1 January 1970 in front of `end`. Years begin in March here, so that a leap day is the
+ * last one of its year; 400 of them have 146,097 days. (H. Hinnant, chrono-Compatible Low-Level Date Algorithms.) */
+static char *date_before(char *end, uint64_t day) {
+  const uint64_t since = day + 719468, cycle = since / 146097, of_cycle = since % 146097; /* from 1 March of year 0 */
+  const uint64_t year = (of_cycle - of_cycle / 1460 + of_cycle / 36524 - of_cycle / 146096) / 365;
+  const uint64_t of_year = of_cycle - (365 * year + year / 4 - year / 100);
+  const uint64_t month = (5 * of_year + 2) / 153; /* 0: March */
+  char *at = digits_before(end, of_year - (153 * month + 2) / 5 + 1, 2);
+  *--at = '-';
+  at = digits_before(at, month < 10 ? month + 3 : month - 9, 2);
+  *--at = '-';
+  return digits_before(at, 400 * cycle + year + (month >= 10), 4);
+}
+
 void api_json_member_instant(api_text *text, const char *name, int64_t unix_ms) {
   api_json_key(text, name);
   if (unix_ms <= 0) {
     api_json_null(text);
     return;
   }
-  time_t seconds = (time_t)(unix_ms / 1000);
-  struct tm utc;
-  char stamp[48];
-  gmtime_r(&seconds, &utc);
-  size_t n = strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
-  snprintf(stamp + n, sizeof stamp - n, ".%03dZ", (int)(unix_ms % 1000));
-  api_json_string(text, stamp);
+  const uint64_t ms = (uint64_t)unix_ms, second = ms / 1000 % 86400;
+  const uint64_t parts[] = {ms % 1000, second % 60, second / 60 % 60, second / 3600};
+  static const char after[] = {'Z', '.', ':', ':'}, widths[] = {3, 2, 2, 2};
+  char stamp[40], *const end = stamp + sizeof stamp, *at = end;
+  *--at = '"';
+  for (int i = 0; i < 4; i++) {
+    *--at = after[i];
+    at = digits_before(at, parts[i], widths[i]);
+  }
+  *--at = 'T';
+  at = date_before(at, ms / 86400000);
+  *--at = '"';
+  api_text_append(text, at, (size_t)(end - at));
 }

@@ -10,12 +10,17 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "api/json.h"
 #include "faults.h"
 #include "isolate/readers.h"
 #include "log.h"
 #include "store/crashes.h"
 #include "store/object_removal.h"
 #include "store/owners.h"
+
+/* Bytes. A file of at most so many goes to its process in the frame: a copy costs less there than a descriptor, which
+ * the daemon opens and the process maps, faults in and unmaps. The socket takes so much at once. */
+enum { SENT_BYTES = 64 << 10 };
 
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload) {
   api_hash whole = *hash;
@@ -71,35 +76,45 @@ static int check(const task_head *task, const unsigned char *bytes, orb_context 
   return fine;
 }
 
-int intake_check_here(const task_head *task, int fd, orb_context *ctx, api_text *json, api_problem *problem) {
-  const void *bytes = "";
-  if (task->bytes > 0) {
-    bytes = mmap(NULL, (size_t)task->bytes, PROT_READ, MAP_PRIVATE, fd, 0);
-    if (bytes == MAP_FAILED) {
-      return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
-    }
+int intake_check_here(const task_head *task, const unsigned char *sent, int fd, orb_context *ctx, api_text *json,
+                      api_problem *problem) {
+  if (sent) {
+    return check(task, sent, ctx, json, problem);
+  }
+  const void *bytes = mmap(NULL, (size_t)task->bytes, PROT_READ, MAP_PRIVATE, fd, 0);
+  if (bytes == MAP_FAILED) {
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   int fine = check(task, bytes, ctx, json, problem);
-  if (task->bytes > 0) {
-    munmap((void *)(uintptr_t)bytes, (size_t)task->bytes);
-  }
+  munmap((void *)(uintptr_t)bytes, (size_t)task->bytes);
   return fine;
 }
 
-/* Whether a description says what the daemon knows itself: jobs of all owners read the mesh as it says. */
+/* Whether a description is JSON and says what the daemon knows itself: jobs of all owners read the mesh as it says. */
 static int is_of(const task_head *task, const char *text) {
   api_mesh_summary summary;
-  return api_mesh_summarise(text, &summary) && strcmp(summary.repair, task->repair) == 0 &&
-         (task->format == ORB_FORMAT_AUTO || strcmp(summary.format, orb_format_name(task->format)) == 0);
+  api_json_error error;
+  cJSON *description = api_json_parse(text, strlen(text), &error);
+  int fine = api_mesh_summary_of(description, &summary) && strcmp(summary.repair, task->repair) == 0 &&
+             (task->format == ORB_FORMAT_AUTO || strcmp(summary.format, orb_format_name(task->format)) == 0);
+  cJSON_Delete(description);
+  return fine;
 }
 
+/* What a process gets: the bytes, or a descriptor of the file. */
+typedef struct given_file {
+  const unsigned char *sent; /* NULL: the descriptor */
+  int fd;
+} given_file;
+
 /* 1 with the description, 0 with the problem, −1: the process died or was stopped. */
-static int ask(isolated *process, const task_head *task, int fd, api_text *json, api_problem *problem) {
-  const struct iovec begin = {(void *)(uintptr_t)task, sizeof *task};
+static int ask(isolated *process, const task_head *task, given_file file, api_text *json, api_problem *problem) {
+  const struct iovec parts[2] = {{(void *)(uintptr_t)task, sizeof *task},
+                                 {(void *)(uintptr_t)file.sent, file.sent ? (size_t)task->bytes : 0}};
   frame f;
   done_head done;
   char *text = NULL;
-  if (isolate_send(process, FRAME_TASK, &begin, 1, fd) != CHANNEL_OK ||
+  if (isolate_send(process, FRAME_TASK, parts, 2, file.fd) != CHANNEL_OK ||
       isolate_receive(process, CHANNEL_MOST, &f) != CHANNEL_OK) {
     return -1;
   }
@@ -116,8 +131,8 @@ static int ask(isolated *process, const task_head *task, int fd, api_text *json,
 
 /* As ask(), in a process that may have read other files of the tenant (*others), or, without a tenant, in one of its
  * own. status: how it ended, if the result is −1. */
-static int ask_one(const task_head *task, int fd, const char *tenant, orb_context *ctx, const intake_limits *limits,
-                   api_text *json, api_problem *problem, int *others, int *status) {
+static int ask_one(const task_head *task, given_file file, const char *tenant, orb_context *ctx,
+                   const intake_limits *limits, api_text *json, api_problem *problem, int *others, int *status) {
   isolated own, *process = &own;
   task_head head = *task;
   reader *r = tenant ? reader_take(tenant, limits->part, task->bytes, task->memory, ctx) : NULL;
@@ -133,7 +148,7 @@ static int ask_one(const task_head *task, int fd, const char *tenant, orb_contex
   }
   process->wanted = limits->wanted;
   process->user = limits->user;
-  int result = ask(process, &head, fd, json, problem);
+  int result = ask(process, &head, file, json, problem);
   if (r && result >= 0) {
     reader_give(r);
   } else {
@@ -142,24 +157,36 @@ static int ask_one(const task_head *task, int fd, const char *tenant, orb_contex
   return result;
 }
 
+/* 0: no descriptor. */
+static int give_file(const intake_file *file, given_file *out) {
+  char path[40];
+  *out = (given_file){.sent = file->size <= SENT_BYTES ? file->bytes : NULL, .fd = -1};
+  if (!out->sent) {
+    snprintf(path, sizeof path, "/proc/self/fd/%d", file->temp->fd);
+    out->fd = open(path, O_RDONLY | O_CLOEXEC);
+  }
+  return out->sent || out->fd >= 0;
+}
+
 /* Checks the mesh in a process that no other tenant uses. */
 static int check_isolated(const intake_file *file, const task_head *task, const char *tenant, orb_context *ctx,
                           const intake_limits *limits, api_text *json, api_problem *problem, int *died) {
-  char path[40], why[100];
+  char why[100];
   int others, status = -1;
-  snprintf(path, sizeof path, "/proc/self/fd/%d", file->temp->fd);
-  int fd = open(path, O_RDONLY | O_CLOEXEC);
-  if (fd < 0) {
+  given_file given;
+  if (!give_file(file, &given)) {
     return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
   }
-  int result = ask_one(task, fd, tenant, ctx, limits, json, problem, &others, &status);
+  int result = ask_one(task, given, tenant, ctx, limits, json, problem, &others, &status);
   if (result < 0 && others && orb_context_check(ctx) == ORB_OK) {
     isolate_status_text(status, why, sizeof why);
     log_warn("a process that checked several meshes, the last of them %s, %s; this one is checked again", file->id,
              why);
-    result = ask_one(task, fd, NULL, ctx, limits, json, problem, &others, &status);
+    result = ask_one(task, given, NULL, ctx, limits, json, problem, &others, &status);
   }
-  close(fd);
+  if (given.fd >= 0) {
+    close(given.fd);
+  }
   if (result >= 0) {
     return result;
   }
@@ -234,12 +261,12 @@ static store_result put_row(const intake_file *file, catalogue *cat, objects *st
 }
 
 store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx,
-                          const intake_limits *limits, const char *tenant, int64_t quota, int *fresh,
+                          const intake_limits *limits, const char *tenant, int64_t quota, intake_stored *out,
                           api_problem *problem) {
   api_text json = {0};
   resource row = {.kind = RESOURCE_MESH, .bytes = file->size, .created = (int64_t)time(NULL) * 1000};
-  int died = 0;
-  *fresh = 0;
+  int died = 0, fresh = 0;
+  *out = (intake_stored){0};
   if (!describe(file, cat, tenant, ctx, limits, row.created, &json, problem, &died)) {
     if (died) {
       catalogue_crash_of_mesh(cat, file->id, tenant, row.created);
@@ -254,10 +281,15 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
   store_result stored = objects_publish(store, file->temp, OBJECT_MESH, file->id);
   FAULT_POINT("mesh-published");
   if (stored == STORE_OK) {
-    stored = put_row(file, cat, store, &row, tenant, quota, fresh);
+    stored = put_row(file, cat, store, &row, tenant, quota, &fresh);
   }
   objects_let_go(store);
-  resource_free(&row);
+  out->fresh = fresh != 0;
+  if (fresh == PUT_FIRST) {
+    out->row = row;
+  } else {
+    resource_free(&row);
+  }
   if (stored == STORE_CONFLICT) {
     drop_unused(cat, store, file->id);
   }

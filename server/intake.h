@@ -33,16 +33,23 @@ typedef struct intake_limits {
   void *user;
 } intake_limits;
 
-/* Reads, repairs and checks the mesh, publishes the file and makes the tenant an owner. `*fresh`: the tenant did not
- * own it before. STORE_CONFLICT: the tenant's quota in bytes (0: no limit) has no room, and nothing is stored. A mesh
- * that is refused leaves its problem, and STORE_OK. */
+/* What became of a file. */
+typedef struct intake_stored {
+  int fresh;    /* the tenant did not own the mesh before */
+  resource row; /* if this file was the first of its mesh: the row that all see; else without json. resource_free() */
+} intake_stored;
+
+/* Reads, repairs and checks the mesh, publishes the file and makes the tenant an owner. STORE_CONFLICT: the tenant's
+ * quota in bytes (0: no limit) has no room, and nothing is stored. A mesh that is refused leaves its problem, and
+ * STORE_OK. */
 store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx,
-                          const intake_limits *limits, const char *tenant, int64_t quota, int *fresh,
+                          const intake_limits *limits, const char *tenant, int64_t quota, intake_stored *out,
                           api_problem *problem);
 
-/* Within a process of its own: checks the mesh in this file (isolate/task.h). 1 with its description, or 0 with the
- * problem. */
-int intake_check_here(const task_head *task, int fd, orb_context *ctx, api_text *json, api_problem *problem);
+/* Within a process of its own: checks the mesh in a file, which is `sent` or else in the descriptor (isolate/task.h). 1
+ * with its description, or 0 with the problem. */
+int intake_check_here(const task_head *task, const unsigned char *sent, int fd, orb_context *ctx, api_text *json,
+                      api_problem *problem);
 
 /* Restores the object of a known mesh from this file if it is lost or has other bytes. O(size). */
 void intake_restore(const intake_file *file, objects *store);

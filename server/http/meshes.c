@@ -93,13 +93,27 @@ static void refuse_over_quota(request *r) {
   reply_problem(r, &problem);
 }
 
+/* The row that was stored, or, if the mesh was there, the one that this tenant sees. If two requests upload the same
+ * mesh at once, both get the row that was written first. drops: of the cache, before the row was stored. */
+static void reply_stored(request *r, const intake_file *file, intake_stored *stored, unsigned long long drops) {
+  server *srv = r->srv;
+  store_result result = STORE_ERROR;
+  const cached *entry = stored->row.json ? cache_add(srv->descriptions, &stored->row, access_tenant(r), drops)
+                                         : find_description(srv, RESOURCE_MESH, file->id, access_tenant(r), &result);
+  if (entry) {
+    reply_cached(r, 201, entry);
+  } else {
+    reply_store(r, result);
+  }
+}
+
 /* Checks the mesh within so many bytes of memory and stores it. 0, and no answer: it needs more, and is_last is not
  * set.
  */
 static int store_within(request *r, const intake_file *file, int64_t memory, int is_last) {
   server *srv = r->srv;
   const char *tenant = access_tenant(r);
-  int fresh = 0;
+  intake_stored kept;
   api_problem problem = {0};
   const intake_limits limits = {.memory = memory,
                                 .deadline_ms = orb_clock_ms() + 1000 * srv->options->check_seconds,
@@ -113,9 +127,10 @@ static int store_within(request *r, const intake_file *file, int64_t memory, int
     return 1;
   }
   int64_t quota = r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0;
-  store_result stored = intake_store(file, srv->cat, srv->store, ctx, &limits, tenant, quota, &fresh, &problem);
+  const unsigned long long drops = cache_drops(srv->descriptions);
+  store_result stored = intake_store(file, srv->cat, srv->store, ctx, &limits, tenant, quota, &kept, &problem);
   orb_context_destroy(ctx);
-  if (fresh && r->caller) {
+  if (kept.fresh && r->caller) {
     callers_recount(srv->callers, tenant);
   }
   if (!is_last && problem.name && strcmp(problem.name, "no-memory") == 0) {
@@ -134,10 +149,8 @@ static int store_within(request *r, const intake_file *file, int64_t memory, int
     refuse_over_quota(r);
     return 1;
   }
-  /* If two requests upload the same mesh at once, both get the row that was written first. */
-  const cached *entry = stored == STORE_OK ? find_description(srv, RESOURCE_MESH, file->id, tenant, &stored) : NULL;
-  if (entry) {
-    reply_cached(r, 201, entry);
+  if (stored == STORE_OK) {
+    reply_stored(r, file, &kept, drops);
   } else {
     reply_store(r, stored);
   }

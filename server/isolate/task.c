@@ -30,13 +30,18 @@ void task_end(int channel, done_head *done, const char *json, const api_problem 
   _exit(task_answer(channel, done, json, problem) == CHANNEL_OK ? 0 : 1);
 }
 
-static int is_json(const char *before, const char *text, const char *after) {
+int task_is_json(const char *text) {
   api_json_error error;
-  api_text whole = {0};
-  api_text_printf(&whole, "%s%s%s", before, text, after);
-  cJSON *read = whole.failed ? NULL : api_json_parse(whole.data, whole.size, &error);
-  int fine = read != NULL;
+  cJSON *read = api_json_parse(text, strlen(text), &error);
   cJSON_Delete(read);
+  return read != NULL;
+}
+
+/* Whether a text has the members of an object. */
+static int are_members(const char *text) {
+  api_text whole = {0};
+  api_text_printf(&whole, "{%s}", text);
+  int fine = !whole.failed && task_is_json(whole.data);
   api_text_free(&whole);
   return fine;
 }
@@ -52,7 +57,7 @@ int task_read_done(const frame *f, done_head *done, char **json, api_problem *pr
   const char *text = (const char *)f->bytes + sizeof *done;
   int is_empty = f->size == sizeof *done;
   if (!done->fine) {
-    if (!done->problem[0] || (!is_empty && !is_json("{", text, "}"))) {
+    if (!done->problem[0] || (!is_empty && !are_members(text))) {
       return 0;
     }
     api_refuse(problem, api_problem_name(done->problem), "%s", done->detail);
@@ -62,7 +67,7 @@ int task_read_done(const frame *f, done_head *done, char **json, api_problem *pr
     return 1;
   }
   if (!is_empty) {
-    *json = is_json("", text, "") ? strdup(text) : NULL;
+    *json = strdup(text);
   }
   return is_empty || *json;
 }

@@ -10,8 +10,8 @@
 
 typedef enum task_kind { TASK_CHECK, TASK_EMBEDDING, TASK_SUPERMESH } task_kind;
 
-/* FRAME_TASK. For a job, its request follows, then FRAME_INPUT for each input and FRAME_GO. For a check, the descriptor
- * of the file comes with the frame. */
+/* FRAME_TASK. For a job, its request follows, then FRAME_INPUT for each input and FRAME_GO. For a check, the file
+ * follows, or its descriptor comes with the frame. */
 typedef struct task_head {
   task_kind kind;
   int threads, nice;
@@ -63,8 +63,10 @@ channel_result task_answer(int channel, done_head *done, const char *json, const
 /* The same, then ends the process. */
 _Noreturn void task_end(int channel, done_head *done, const char *json, const api_problem *problem);
 
-/* The daemon's side. Reads FRAME_DONE: json is allocated with malloc(), or NULL. 0: the result contradicts itself. */
+/* The daemon's side. Reads FRAME_DONE: json is allocated with malloc(), or NULL. The caller checks whether it is JSON,
+ * with task_is_json() or by reading it. 0: the result contradicts itself. */
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem);
+int task_is_json(const char *text);
 /* A limit on the processor time of a job with this many threads until its deadline. */
 int64_t task_cpu_seconds(int64_t deadline_ms, int threads);
 

@@ -151,14 +151,14 @@ static int put(database *db, void *arg) {
   if (code == SQL_OK) {
     code = owner_insert(db, p->row, p->tenant, first ? NULL : p->row->json);
   }
-  p->fresh = code == SQL_OK;
+  p->fresh = code != SQL_OK ? 0 : first ? PUT_FIRST : PUT_SHARED;
   return code;
 }
 
 store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh) {
   put_arg arg = {.row = r, .tenant = tenant, .quota = quota};
   store_result result = catalogue_write_held(cat, put, &arg);
-  *fresh = result == STORE_OK && arg.fresh;
+  *fresh = result == STORE_OK ? arg.fresh : 0;
   return result;
 }
 

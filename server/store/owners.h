@@ -23,7 +23,9 @@ int owner_of_job(database *db, const char *job, int64_t now);
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all);
 
 /* Adds a mesh or landmarks if absent, and makes the tenant an owner. STORE_CONFLICT: the tenant would exceed its quota
- * in bytes (0: no limit); nothing changes. *fresh: the tenant did not own it before. */
+ * in bytes (0: no limit); nothing changes. *fresh: 0 if the tenant owned it before; PUT_SHARED: others do, and their
+ * row stays; PUT_FIRST: the row is the given one, and all see it as it is. */
+enum { PUT_SHARED = 1, PUT_FIRST };
 store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh);
 /* Adds the row of an alignment that a job of this tenant made, or replaces it. */
 store_result catalogue_put_alignment(catalogue *cat, const resource *row, const char *tenant);

@@ -227,5 +227,19 @@ const char *const postgresql_migrations[] = {
     "  AND EXISTS(SELECT 1 FROM token WHERE tenant=NEW.name AND quota_bytes>0)"
     "  THEN PERFORM tell(TG_TABLE_SCHEMA, 'u' || NEW.name); END IF; RETURN NULL; END $$;"
     "CREATE TRIGGER bytes_told AFTER INSERT OR UPDATE OF bytes ON tenant FOR EACH ROW EXECUTE FUNCTION bytes_told();",
+    /* Turns go by the time that workers had jobs. It replaces the estimate that a claim has charged (ESTIMATE of
+     * shared.c) when a job leaves its worker, in whichever way. An owner whose first unfinished job comes starts level
+     * with the least served of the others, the time of their running jobs included. */
+    "CREATE FUNCTION job_used() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"
+    " UPDATE turn SET service=service+greatest(0, clock_ms()-OLD.claimed)-(10+OLD.cost/100) WHERE owner=OLD.owner;"
+    " RETURN NULL; END $$;"
+    "CREATE TRIGGER job_used AFTER UPDATE OF state ON job FOR EACH ROW"
+    " WHEN (OLD.state=1 AND NEW.state<>1 AND OLD.kind<>2) EXECUTE FUNCTION job_used();"
+    "CREATE FUNCTION turn_entered() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"
+    " NEW.service:=coalesce((SELECT min(o.service+coalesce(b.beyond, 0)) FROM turn o LEFT JOIN"
+    "  (SELECT owner, sum(greatest(0, clock_ms()-claimed-(10+cost/100))) AS beyond FROM job WHERE state=1 AND kind<>2"
+    "   GROUP BY owner) AS b ON b.owner=o.owner WHERE o.unfinished>0 AND o.owner<>NEW.owner), 0);"
+    " RETURN NEW; END $$;"
+    "CREATE TRIGGER turn_entered BEFORE INSERT ON turn FOR EACH ROW EXECUTE FUNCTION turn_entered();",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];

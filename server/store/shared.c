@@ -5,7 +5,8 @@
 #include "store/deliveries.h"
 #include "store/rows.h"
 
-/* Estimate of a job's time, charged until it is known: as queue/schedule.c does within a process. */
+/* Estimate of a job's time, charged until it is known: as queue/schedule.c does within a process. The trigger job_used
+ * of postgresql_schema.c takes it back. */
 #define ESTIMATE(job) "(10+" job ".cost/100)"
 
 /* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner. Owners with ready jobs, each

@@ -114,17 +114,18 @@ static _Noreturn void run_job_task(confined *c) {
   task_end(c->channel, &done, out.row.json, &problem);
 }
 
-/* The file is the frame's descriptor. */
+/* The file follows the task, or is the frame's descriptor. */
 static void check_one(confined *c, const frame *f) {
+  const int is_sent = f->fd < 0;
   api_problem problem = {0};
   api_text json = {0};
   done_head done = {0};
   orb_context *ctx = make_context(c, NULL);
-  if (!ctx || f->fd < 0) {
+  if (!ctx || (is_sent && f->size - sizeof c->task != (uint64_t)c->task.bytes)) {
     _exit(1);
   }
   FAULT_POINT("check-begun");
-  done.fine = intake_check_here(&c->task, f->fd, ctx, &json, &problem);
+  done.fine = intake_check_here(&c->task, is_sent ? f->bytes + sizeof c->task : NULL, f->fd, ctx, &json, &problem);
   if (!c->task.again) {
     task_end(c->channel, &done, json.data, &problem);
   }

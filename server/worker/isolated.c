@@ -185,7 +185,7 @@ static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, 
 static int take_done(const run_job *j, api_job_kind kind, const frame *f, run_output *out, api_problem *problem) {
   done_head done;
   char *json;
-  if (!task_read_done(f, &done, &json, problem) || (done.fine && !json)) {
+  if (!task_read_done(f, &done, &json, problem) || (done.fine && !(json && task_is_json(json)))) {
     free(json);
     api_problem_free(problem);
     return -1;

@@ -120,7 +120,7 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
                  api_problem *problem) {
   const run_env *env = d->env;
   intake_file file;
-  int fresh;
+  intake_stored kept = {0};
   progress_report(env->progress, "check", 0);
   if (!intake_open(&file, &d->temp, &d->hash, d->size, &wish->upload)) {
     return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
@@ -138,7 +138,8 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
                                   .deadline_ms = orb_clock_ms() + d->options->check_ms,
                                   .max_triangles = d->options->max_triangles,
                                   .part = BUDGET_CHECKS};
-    stored = intake_store(&file, env->cat, env->store, d->ctx, &limits, job_owner(j), wish->quota, &fresh, problem);
+    stored = intake_store(&file, env->cat, env->store, d->ctx, &limits, job_owner(j), wish->quota, &kept, problem);
+    resource_free(&kept.row);
     budget_give(d->options->memory, BUDGET_CHECKS, memory, NULL);
     sem_post(d->options->checks);
   }

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 
@@ -249,8 +250,80 @@ static void test_stored_meshes(void **state) {
   }
 }
 
+/* As the C library has them: every day of 400 years, the first and the last moment of far years, and random instants.
+ */
+static void check_instant(int64_t unix_ms) {
+  char expected[64], stamp[48];
+  const time_t seconds = (time_t)(unix_ms / 1000);
+  struct tm utc;
+  assert_non_null(gmtime_r(&seconds, &utc));
+  assert_true(strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc) > 0);
+  snprintf(expected, sizeof expected, "\"t\":\"%s.%03dZ\"", stamp, (int)(unix_ms % 1000));
+  api_text text = {0};
+  api_json_member_instant(&text, "t", unix_ms);
+  assert_false(text.failed);
+  assert_string_equal(text.data, expected);
+  api_text_free(&text);
+}
+
+static void test_instants(void **state) {
+  (void)state;
+  const int64_t day = 86400000;
+  uint64_t random = 1;
+  for (int64_t i = 0; i < 146097; i++) {
+    random = random * 6364136223846793005u + 1442695040888963407u;
+    check_instant(1 + i * day);
+    check_instant((i + 1) * day - 1);
+    check_instant(1 + (int64_t)(random >> 18)); /* until the year 4200 */
+  }
+  check_instant(253402300799999); /* the end of the year 9999 */
+  check_instant(253402300800000);
+  check_instant(INT64_MAX / 1000000);
+}
+
+static void test_integers(void **state) {
+  (void)state;
+  static const int64_t values[] = {0, 1, -1, 9, 10, 999999999999999, -1000000000000000, INT64_MAX, INT64_MIN};
+  static const double doubles[] = {0.0, -0.0, 1, -1, 100000, 999999999999999.0, 1e15, -1e15, 1e16, 123456789012345.0,
+                                   0.5};
+  for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
+    char expected[32];
+    api_text text = {0};
+    snprintf(expected, sizeof expected, "%lld", (long long)values[i]);
+    api_json_integer(&text, values[i]);
+    assert_string_equal(text.data, expected);
+    api_text_free(&text);
+  }
+  for (size_t i = 0; i < sizeof doubles / sizeof *doubles; i++) {
+    char expected[32];
+    api_text text = {0};
+    snprintf(expected, sizeof expected, "%.15g", doubles[i]);
+    api_json_number(&text, doubles[i]);
+    assert_string_equal(text.data, expected);
+    api_text_free(&text);
+  }
+}
+
+/* What is formatted is the same wherever it meets the end of the room, which grows from 256 bytes on. */
+static void test_formatted(void **state) {
+  (void)state;
+  for (size_t before = 0; before < 600; before++) {
+    api_text text = {0};
+    for (size_t i = 0; i < before; i++) {
+      api_text_add(&text, "x");
+    }
+    api_text_printf(&text, "%d%s", 42, "nine bytes");
+    assert_int_equal(text.size, before + 12);
+    assert_string_equal(text.data + before, "42nine bytes");
+    api_text_free(&text);
+  }
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_grammar),
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_instants),
+                                     cmocka_unit_test(test_integers),
+                                     cmocka_unit_test(test_formatted),
+                                     cmocka_unit_test(test_grammar),
                                      cmocka_unit_test(test_utf8),
                                      cmocka_unit_test(test_depth),
                                      cmocka_unit_test(test_numbers_read_back),

@@ -119,6 +119,64 @@ static void test_order(void **state) {
   assert_int_equal(claim(n, 0, &c), STORE_NOT_FOUND);
 }
 
+static int began_earlier(database *db, void *ms) {
+  sql_statement *st = database_statement(db, "UPDATE job SET claimed=claimed-?1 WHERE state=1");
+  sql_bind_integer(st, 1, *(const int64_t *)ms);
+  return database_run(db, st);
+}
+
+/* Ends a job that its worker has had for so long. */
+static void end_after(nodes *n, int node, const job_claim *c, int64_t ms) {
+  assert_int_equal(catalogue_write(n->cat[node], began_earlier, &ms), STORE_OK);
+  end(n, node, c);
+}
+
+/* Claims a job, which must be of this owner. */
+static void claim_of(nodes *n, int node, const char *owner, job_claim *c) {
+  assert_int_equal(claim(n, node, c), STORE_OK);
+  assert_string_equal(c->row.owner, owner);
+}
+
+/* Turns go by the time that jobs took, not by what was estimated: both owners' jobs have the same cost. */
+static void test_time_counts(void **state) {
+  enum { MINUTE = 60000 };
+  nodes *n = *state;
+  job_row row;
+  job_claim c;
+  for (char key = '0'; key < '3'; key++) {
+    submit(n, 0, "ann", key, 0, &row);
+    submit(n, 1, "bob", (char)(key + 3), 0, &row);
+  }
+  claim_of(n, 0, "ann", &c);
+  end_after(n, 0, &c, 60 * MINUTE);
+  for (int i = 0; i < 3; i++) { /* ann waits until bob has had an hour too */
+    claim_of(n, i % 2, "bob", &c);
+    end_after(n, i % 2, &c, 20 * MINUTE + i * MINUTE);
+  }
+  claim_of(n, 1, "ann", &c);
+  end_after(n, 1, &c, MINUTE);
+  claim_of(n, 0, "ann", &c);
+}
+
+/* An owner that comes while a job of another has run for an hour is not an hour ahead. */
+static void test_start_level(void **state) {
+  enum { MINUTE = 60000 };
+  int64_t hour = 60 * MINUTE;
+  nodes *n = *state;
+  job_row row;
+  job_claim long_one, c;
+  submit(n, 0, "ann", '1', 0, &row);
+  submit(n, 0, "ann", '2', 0, &row);
+  claim_of(n, 0, "ann", &long_one);
+  assert_int_equal(catalogue_write(n->cat[0], began_earlier, &hour), STORE_OK);
+  submit(n, 1, "bob", '3', 0, &row);
+  submit(n, 1, "bob", '4', 0, &row);
+  end_after(n, 0, &long_one, MINUTE);
+  claim_of(n, 1, "bob", &c); /* who began level with ann, when she had used an hour */
+  end_after(n, 1, &c, 2 * MINUTE);
+  claim_of(n, 1, "ann", &c);
+}
+
 /* A worker that is kept for small jobs finds one behind any number of large ones. */
 static void test_small_behind_large(void **state) {
   enum { LARGE_JOBS = 90, LARGE_COST = 1000000, SMALL_COST = 10 };
@@ -188,9 +246,9 @@ static void test_lease(void **state) {
   job_row row, got;
   job_claim lost, taken;
   submit(n, 0, "ann", '1', 0, &row);
-  assert_true(notices_renew(n->bell[0], names[0], 1, LEASE_MS));
   assert_int_equal(claim(n, 0, &lost), STORE_OK);
-  assert_false(catalogue_lost_jobs(n->cat[1], LEASE_MS));
+  assert_false(catalogue_lost_jobs(n->cat[1], LEASE_MS)); /* its lease is a minute */
+  assert_true(notices_renew(n->bell[0], names[0], 1, LEASE_MS));
   while (!catalogue_lost_jobs(n->cat[1], LEASE_MS)) {
     usleep(20000);
   }
@@ -514,6 +572,8 @@ static void test_excluding_waits_for_transactions(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_order, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_time_counts, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_start_level, setup, teardown),
       cmocka_unit_test_setup_teardown(test_small_behind_large, setup, teardown),
       cmocka_unit_test_setup_teardown(test_one_flight, setup, teardown),
       cmocka_unit_test_setup_teardown(test_limits, setup, teardown),
