@@ -238,7 +238,7 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   orb_map_course course = {0};
   const orb_aims aims = {.targets = m->targets,
                          .keep_angles = m->keep_angles,
-                         .course = &course,
+                         .course = m->shape_count == 2 ? &course : NULL, /* only pairs have a next match */
                          .walks_first = m->bend > ORB_FIND_WALKS_FIRST};
   ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? &aims : NULL, options->preset));
   if (m->shape_count > 2) {

@@ -6,7 +6,9 @@
 #include "base/memory.h"
 #include "numeric/clones.h"
 
-/* Vertices of a block: two vectors of floats. Boxes of a row, which are measured at once, and its groups. */
+/* Vertices of a block: two vectors of floats, and few of the blocks are near. Boxes of a row, which are measured at
+ * once: those of a copy of 1,000 vertices, which is searched most. Groups of a row: those that one vector holds side by
+ * side. */
 enum { BLOCK = 16, ROW = 64, GROUPS = 16, COORDINATES = 6 };
 
 static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|² against |x − x'|², areas being 4π */
@@ -88,8 +90,8 @@ orb_status orb_searched_create(orb_context *ctx, const double *position, const d
   out->columns = (count + BLOCK - 1) / BLOCK * BLOCK;
   out->boxes = (out->columns / BLOCK + ROW - 1) / ROW * ROW;
   out->order = ORB_NEW(ctx, int32_t, out->columns);
-  out->at = ORB_NEW(ctx, float, COORDINATES *(size_t)out->columns);
-  out->box = ORB_NEW(ctx, float, 2 * COORDINATES * (size_t)out->boxes);
+  out->at = ORB_NEW(ctx, float, (size_t)out->columns *COORDINATES);
+  out->box = ORB_NEW(ctx, float, (size_t)out->boxes * 2 * COORDINATES);
   point *list = ORB_NEW(ctx, point, count);
   const int fine = out->order && out->at && out->box && list;
   if (fine) {
@@ -210,11 +212,11 @@ static int nearest_box(const row_distances *d) {
 }
 
 int32_t orb_searched_nearest(const orb_searched *s, const double x[3], const double n[3]) {
-  const float weight = (float)sqrt(NORMAL_WEIGHT);
-  const float q[COORDINATES] = {(float)x[0],          (float)x[1],          (float)x[2],
-                                weight * (float)n[0], weight * (float)n[1], weight * (float)n[2]};
-  float least = INFINITY;
+  float q[COORDINATES], least = INFINITY;
   int32_t best = 0;
+  for (int k = 0; k < COORDINATES; k++) {
+    q[k] = coordinate_of(x, n, 0, k);
+  }
   for (int32_t row = 0; row < s->boxes; row += ROW) {
     row_distances d;
     measure_boxes(s->box + row, s->boxes, q, &d);

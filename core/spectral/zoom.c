@@ -341,31 +341,22 @@ int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t s
   return orb_zoom_vertex_image(pair, map, pair->shape[back ? 1 : 0]->sample[sample], back);
 }
 
-/* Adds the squared differences of one function to those of IMAGE_BLOCK vertices. */
-ORB_CLONES static void add_squares(const double *function, double value, double *restrict sum) {
-  for (int i = 0; i < IMAGE_BLOCK; i++) {
+/* Adds the squared differences of one function at so many vertices. */
+ORB_CLONES static void add_squares(const double *function, double value, size_t count, double *restrict sum) {
+  for (size_t i = 0; i < count; i++) {
     const double d = value - function[i];
     sum[i] += d * d;
   }
 }
 
-/* The vertices [begin, end) of one block; the nearest one so far. */
-static void look_at_block(const orb_spectral_shape *to, const double *point, int size, size_t begin, size_t end,
+/* Compares an image with `count` vertices from `begin` on; the nearest one so far. */
+static void look_at_block(const orb_spectral_shape *to, const double *point, int size, size_t begin, size_t count,
                           double *least, int32_t *nearest) {
-  const size_t n = (size_t)to->mesh->vertex_count;
   double sum[IMAGE_BLOCK] = {0};
   for (int k = 0; k < size; k++) {
-    const double *function = to->function + (size_t)k * n + begin;
-    if (end - begin == IMAGE_BLOCK) {
-      add_squares(function, point[k], sum);
-    } else {
-      for (size_t i = 0; i < end - begin; i++) {
-        const double d = point[k] - function[i];
-        sum[i] += d * d;
-      }
-    }
+    add_squares(to->function + (size_t)k * (size_t)to->mesh->vertex_count + begin, point[k], count, sum);
   }
-  for (size_t i = 0; i < end - begin; i++) {
+  for (size_t i = 0; i < count; i++) {
     *nearest = sum[i] < *least ? (int32_t)(begin + i) : *nearest;
     *least = sum[i] < *least ? sum[i] : *least;
   }
@@ -382,7 +373,8 @@ int32_t orb_zoom_vertex_image(const orb_zoom_pair *pair, const orb_zoom *map, in
     }
   }
   for (size_t begin = 0; begin < n; begin += IMAGE_BLOCK) {
-    look_at_block(to, point, map->size, begin, begin + IMAGE_BLOCK < n ? begin + IMAGE_BLOCK : n, &least, &nearest);
+    const size_t left = n - begin, count = left < IMAGE_BLOCK ? left : IMAGE_BLOCK;
+    look_at_block(to, point, map->size, begin, count, &least, &nearest);
   }
   return nearest;
 }

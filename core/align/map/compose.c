@@ -54,8 +54,6 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
-#include "embed/newton/place.h"
-#include "numeric/vec3.h"
 
 static void orb_map_run_free(orb_map_run *c) {
   orb_context *ctx = c->ctx;
@@ -113,20 +111,6 @@ static orb_status prepare(orb_map_run *c) {
   orb_map_normals(c->x, mesh->vertex_count, mesh->triangles, mesh->triangle_count, c->normal);
   memcpy(c->start, c->moving->points, 3 * n * sizeof *c->start);
   return ORB_OK;
-}
-
-/* The energy of the alignment as given. */
-static orb_status given_energy(orb_map_run *c, double *energy) {
-  orb_corner_table s;
-  orb_map_level level = {0};
-  ORB_TRY(orb_corner_table_create(c->ctx, &c->moving->mesh, &s));
-  orb_status status = orb_map_full_level(c, c->moving->points, &s, &level);
-  if (status == ORB_OK) {
-    *energy = orb_map_level_energy(&level);
-  }
-  orb_map_level_free(c->ctx, &level);
-  orb_corner_table_free(c->ctx, &s);
-  return status;
 }
 
 /* Walks to a map in which all pairs meet: through many samples if they are usable, else through few or none. */
@@ -331,7 +315,7 @@ orb_status orb_compose_energy(orb_context *ctx, orb_aligned_shape *fixed, orb_al
   orb_map_run c = {.ctx = ctx, .params = orb_map_params_of(preset), .fixed = fixed, .moving = moving};
   orb_status status;
   ORB_GO(status, prepare(&c), done);
-  status = given_energy(&c, energy);
+  status = orb_map_energy_of(&c, moving->points, c.params.energy.cap, energy);
 done:
   orb_map_run_free(&c);
   return status;
@@ -371,7 +355,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   ORB_GO(status, prepare(&c), done);
   energy[0] = INFINITY;
   if (guide->from != ORB_MAP_FROM_COPY) {
-    ORB_GO(status, given_energy(&c, &energy[0]), done);
+    ORB_GO(status, orb_map_energy_of(&c, moving->points, c.params.energy.cap, &energy[0]), done);
   }
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
@@ -391,7 +375,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     }
   }
   if (guide->course) {
-    ORB_GO(status, orb_map_bulk(&c, &c.course.bulk), done);
+    ORB_GO(status, orb_map_energy_of(&c, c.best, c.params.energy.bulk, &c.course.bulk), done);
     *guide->course = c.course;
   }
   status = take_best(&c, fixed, energy, improved);

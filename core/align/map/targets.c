@@ -90,7 +90,7 @@ static orb_status run_first(orb_map_run *c, int *walked) {
   orb_map_course *course = &c->course;
   course->is_walked = *walked;
   if (c->wants_course) {
-    ORB_TRY(orb_map_bulk(c, &course->first_bulk));
+    ORB_TRY(orb_map_energy_of(c, c->best, c->params.energy.bulk, &course->first_bulk));
   }
   course->is_beaten =
       c->walks_first ? c->beat.energy > 0 && !*walked : c->beat.bulk > 0 && !(course->first_bulk < c->beat.bulk);

@@ -39,7 +39,7 @@ typedef struct orb_map_course {
   int is_beaten;           /* it does not beat what it has to, and is the last */
 } orb_map_course;
 
-/* What a first start has to beat, unless it is the last: 0: nothing. */
+/* What a first start has to beat; else it is the last. 0: nothing. */
 typedef struct orb_map_beat {
   double bulk;   /* of a start from targets */
   double energy; /* of a walk */

@@ -34,7 +34,7 @@ typedef struct orb_map_params {
   /* What the energy of a map says. */
   struct {
     double good; /* up to here the shapes correspond and no further start is tried */
-    double poor; /* above it a start has been caught on the way, and `auto` also pins pairs of its match */
+    double poor; /* above it a start has been caught on the way */
     double cap;  /* of one triangle; keeps a few that are nearly degenerate from hiding the others */
     double bulk; /* the same for the bulk of a map, which says whether limbs go to their limbs, where the energy also
                     says how much the map crumples, and that is close to chance. Of ten comparisons of a right match of

@@ -33,13 +33,13 @@ orb_status orb_map_full_level(orb_map_run *c, const double *points, const orb_co
   return status;
 }
 
-orb_status orb_map_bulk(orb_map_run *c, double *bulk) {
+orb_status orb_map_energy_of(orb_map_run *c, const double *points, double cap, double *energy) {
   orb_corner_table s;
   orb_map_level level = {0};
   ORB_TRY(orb_corner_table_create(c->ctx, &c->moving->mesh, &s));
-  orb_status status = orb_map_full_level(c, c->best, &s, &level);
+  orb_status status = orb_map_full_level(c, points, &s, &level);
   if (status == ORB_OK) {
-    *bulk = orb_map_level_capped_energy(&level, c->params.energy.bulk);
+    *energy = orb_map_level_capped_energy(&level, cap);
   }
   orb_map_level_free(c->ctx, &level);
   orb_corner_table_free(c->ctx, &s);

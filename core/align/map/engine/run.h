@@ -76,8 +76,8 @@ typedef struct orb_map_run {
   int64_t work;           /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
 
-/* The energy of the best map in which a triangle counts params.energy.bulk at most. O(n). */
-ORB_MUST_CHECK orb_status orb_map_bulk(orb_map_run *run, double *bulk);
+/* The energy of the map with these points (mesh order), in which a triangle counts `cap` at most. O(n). */
+ORB_MUST_CHECK orb_status orb_map_energy_of(orb_map_run *run, const double *points, double cap, double *energy);
 
 /* A level of all vertices at these points (mesh order), with the landmarks pinned. s: the order of the vertices; it
  * stays the caller's. */
