@@ -15,9 +15,9 @@ typedef struct api_fetch_request {
       quota; /* bytes that the tenant's token may store; 0: no limit. Stored with the job, not part of the request */
 } api_fetch_request;
 
-/* Return 1, or 0 with *problem filled. Whether the service goes to the URL is not checked here. */
+/* Return 1, or 0 with *problem filled. Does not check whether the service may fetch the URL. */
 int api_fetch_request_read(const cJSON *body, api_fetch_request *out, api_problem *problem);
-/* The text that api_fetch_request_write() made. */
+/* Reads the text that api_fetch_request_write() wrote. */
 int api_fetch_request_load(const char *json, api_fetch_request *out, api_problem *problem);
 
 void api_fetch_request_write(const api_fetch_request *request, api_text *out);

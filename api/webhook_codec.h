@@ -15,8 +15,8 @@ enum { API_EVENTS_ALL = 7, API_EVENTS_TEXT = 40, API_WEBHOOK_URL = 2048 };
 int api_events_parse(const char *list, unsigned *out);
 void api_events_write(unsigned events, char out[API_EVENTS_TEXT]);
 
-/* The member "webhook" of a request: {"url", "events"}. Without events: all. Whether the service goes to the URL is not
- * checked here. */
+/* The member "webhook" of a request: {"url", "events"}. Without events: all. Does not check whether the service may
+ * reach the URL. */
 typedef struct api_webhook {
   char url[API_WEBHOOK_URL]; /* "": the request has none */
   unsigned events;

@@ -1,5 +1,4 @@
-/* A file that came by upload or by download becomes a stored mesh: http/meshes.c and worker/run_fetch.c do this in the
- * same way.
+/* Turns a file into a stored mesh. http/meshes.c calls it for uploads, worker/run_fetch.c for downloads.
  *
  * The mesh is checked even if another tenant already owns it: neither the answer nor its time may reveal that.
  */

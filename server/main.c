@@ -1,4 +1,4 @@
-/* orbmorphd: command line, start, signals, stop. start() shows all parts in order. */
+/* orbmorphd: command line, signals, the control socket. parts.c starts and stops the parts. */
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -12,25 +12,18 @@
 #include "admin/kinds.h"
 #include "backup.h"
 #include "control.h"
-#include "evict.h"
 #include "folder_lock.h"
 #include "housekeeping.h"
 #include "http/certificate.h"
 #include "http/http.h"
-#include "isolate/readers.h"
+#include "isolate/isolate.h"
 #include "log.h"
 #include "maintain.h"
 #include "migrate.h"
-#include "net/client.h"
-#include "scrub.h"
-#include "store/object_removal.h"
-#include "store/place.h"
+#include "parts.h"
 #include "systemd.h"
-#include "trace/send.h"
 #include "worker/confined.h"
 #include "worker/pool.h"
-
-enum { CACHE_BYTES = 64 << 20 };
 
 static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, &admin_webhook, &admin_crash, NULL};
 
@@ -42,10 +35,6 @@ static void raise_descriptor_limit(void) {
       log_warn("the limit on open files could not be raised");
     }
   }
-}
-
-static int has_role(const config *options, const char *role) {
-  return strcmp(options->role, role) == 0;
 }
 
 static void announce(const server *srv) {
@@ -122,16 +111,6 @@ static void on_change(const char *name, int taken) {
   }
 }
 
-static int reload_callers(server *srv) {
-  int fine = callers_reload(srv->callers) & signers_reload(srv->signers);
-  if (fine) {
-    queue_wake_once(srv->q); /* ends streams and waits whose token or key has been removed */
-  } else {
-    log_error("the tokens and keys could not be read again; the previous ones stay valid");
-  }
-  return fine;
-}
-
 /* A command from the control socket. */
 static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
@@ -148,7 +127,7 @@ static int on_command(void *user, const char *line, api_text *reply) {
   }
   int status = kind->apply(srv->cat, line, reply);
   if (status == 0 && !lists) {
-    status = !reload_callers(srv);
+    status = !parts_reload_callers(srv);
     log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s", kind->name, verb, name);
   }
   return status;
@@ -159,7 +138,7 @@ static void reload(server *srv, const command_line *line) {
   if (config_reload(line->options, line->argc, line->argv, on_change)) {
     set_log(line->options);
     queue_set_limit(srv->q, (int)line->options->queue_limit);
-    reload_callers(srv);
+    parts_reload_callers(srv);
     if (certificate_is_loaded() && !certificate_load(line->options->tls_certificate, line->options->tls_key)) {
       log_error("SIGHUP: the previous certificate stays in use");
     }
@@ -235,172 +214,9 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   queue_stop(srv->q, 1);
 }
 
-/* Another node may have changed what this one has in memory. */
-static void on_shared_change(void *user, const char *what) {
-  server *srv = user;
-  if (what[0] == 't') {
-    reload_callers(srv);
-  } else if (what[0] == 'u') {
-    callers_recount(srv->callers, what + 1);
-  } else if (what[0] == '*') {
-    cache_drop_all(srv->descriptions);
-    reload_callers(srv);
-  } else if (what[0] == 'r' && what[1] >= '0' && what[1] < '0' + RESOURCE_KINDS) {
-    cache_drop(srv->descriptions, (resource_kind)(what[1] - '0'), what + 2);
-  }
-}
-
-static int may_deliver(void *q) {
-  return queue_does_housekeeping(q);
-}
-
-static int start_outbox(server *srv, deliver_options *options) {
-  options->may = may_deliver;
-  options->user = srv->q;
-  srv->outbox = deliver_start(options, srv->cat);
-  if (srv->outbox) {
-    queue_on_end(srv->q, deliver_wake, srv->outbox);
-  }
-  return srv->outbox != NULL;
-}
-
-/* A damaged catalogue would answer some requests and lose others: the service does not start on one. */
-static int check_catalogue(const server *srv) {
-  char why[512];
-  if (catalogue_quick_check(srv->cat, why, sizeof why)) {
-    return 1;
-  }
-  why[strcspn(why, "\n")] = 0;
-  log_error(
-      "the catalogue %s/catalogue.sqlite is damaged: %s. Restore a backup into a new folder (orbmorphd restore DIR "
-      "--data "
-      "NEW). Without a backup, keep a copy of the folder and save the readable rows with sqlite3 and its command "
-      ".recover",
-      srv->options->data, why);
-  return 0;
-}
-
-static void heal(void *user, object_kind kind, const char *id) {
-  const server *srv = user;
-  const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
-  evict_damaged(&env, kind, id);
-}
-
-/* From now on, damaged results are deleted and made again. */
-static int heals(server *srv) {
-  objects_on_quarantine(srv->store, heal, srv);
-  return 1;
-}
-
-static int start_scrub(server *srv) {
-  const config *o = srv->options;
-  srv->scrub = scrub_start(srv->cat, srv->store, o->scrub_rate, 1000 * o->scrub_seconds);
-  return srv->scrub || o->scrub_rate == 0;
-}
-
-static int start_traces(const config *o) {
-  return !o->traces[0] ||
-         trace_start(&(trace_options){.url = o->traces, .authorities = o->tls_authorities, .role = o->role});
-}
-
-static int open_stores(server *srv) {
-  const store_place place = store_place_of(srv->options);
-  store_result result = stores_open(&place, &srv->store, &srv->cat);
-  srv->unfit = result == STORE_UNFIT;
-  return result == STORE_OK;
-}
-
-/* Starts all parts in order; 0 if one of them failed. */
-static int start(server *srv, worker_pool **workers) {
-  const config *o = srv->options;
-  long cores = sysconf(_SC_NPROCESSORS_ONLN);
-  srv->memory = budget_create(o->job_memory);
-  const queue_sharing sharing = {.url = o->catalogue,
-                                 .data = o->data,
-                                 .works = !has_role(o, "serve"),
-                                 .lease_ms = 1000 * o->lease_seconds,
-                                 .changed = on_shared_change,
-                                 .user = srv};
-  queue_options queued = {.workers = (int)o->workers,
-                          .cores = cores > 0 ? (int)cores : 1,
-                          .limit = (int)o->queue_limit,
-                          .memory = srv->memory,
-                          .sharing = config_is_shared(o) ? &sharing : NULL};
-  worker_options limits = {.workers = (int)o->workers,
-                           .nice = (int)o->worker_nice,
-                           .job_memory = o->job_memory,
-                           .job_ms = 1000 * o->job_seconds,
-                           .max_triangles = o->max_triangles,
-                           .fetch = {.authorities = o->tls_authorities,
-                                     .check_ms = 1000 * o->check_seconds,
-                                     .memory = srv->memory,
-                                     .max_triangles = o->max_triangles,
-                                     .total_ms = 1000 * o->fetch_seconds,
-                                     .most = o->max_body,
-                                     .disk_reserve = o->disk_reserve}};
-  deliver_options delivered = {.authorities = o->tls_authorities, .retry_ms = 1000 * o->webhook_retry_seconds};
-  char wrong[NETWORKS_WRONG];
-  networks_read(o->webhook_allow, &srv->webhook_allowed, wrong); /* config.c has checked them */
-  networks_read(o->fetch_allow, &srv->fetch_allowed, wrong);
-  delivered.allowed = srv->webhook_allowed;
-  limits.fetch.allowed = srv->fetch_allowed;
-  if (queued.cores < queued.workers) {
-    queued.cores = queued.workers;
-  }
-  srv->works_only = has_role(o, "work");
-  const char *where = srv->works_only ? o->metrics_listen : o->listen;
-  int listens = !where[0] || listen_open(o, where, &srv->at);
-  srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  return listens && srv->memory && open_stores(srv) && check_catalogue(srv) &&
-         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
-         (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->q = queue_create(&queued, srv->cat)) &&
-         queue_recover(srv->q, isolate_is_on()) == STORE_OK && heals(srv) &&
-         (srv->io = tasks_start((int)o->io_threads, NULL)) && readers_start(srv->memory) &&
-         (srv->checks = tasks_start((int)o->workers, srv->memory)) &&
-         (srv->large_checks = tasks_start((int)o->workers, srv->memory)) && net_start() && start_traces(o) &&
-         start_outbox(srv, &delivered) &&
-         (!sharing.works || (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store))) &&
-         (srv->at.fd < 0 || http_start(srv)) && start_scrub(srv);
-}
-
-/* Stops all parts that were started. */
-static void stop(server *srv, worker_pool *workers) {
-  __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
-  scrub_stop(srv->scrub);
-  if (srv->q) {
-    queue_stop(srv->q, 1);
-    worker_pool_join(workers);
-    queue_wake_all(srv->q);
-  }
-  if (srv->daemon) {
-    MHD_quiesce_daemon(srv->daemon);
-  }
-  tasks_stop(srv->io); /* runs the remaining tasks, which resume their connections or go on in `checks` */
-  tasks_stop(srv->checks);
-  tasks_stop(srv->large_checks);
-  http_stop(srv);
-  listen_remove(&srv->at);
-  if (srv->signers) {
-    signers_store_use(srv->signers);
-  }
-  deliver_stop(srv->outbox); /* workers and tasks have ended and no longer wake it */
-  readers_stop();            /* they give memory back, and the budget tells the queue and the pools */
-  queue_destroy(srv->q);
-  tasks_free(srv->io);
-  tasks_free(srv->checks);
-  tasks_free(srv->large_checks);
-  budget_destroy(srv->memory);
-  catalogue_close(srv->cat);
-  objects_close(srv->store);
-  cache_destroy(srv->descriptions);
-  callers_close(srv->callers);
-  signers_close(srv->signers);
-  trace_stop(); /* all threads that make spans have ended */
-}
-
 static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
   worker_pool *workers = NULL;
-  int started = start(srv, &workers);
+  int started = parts_start(srv, &workers);
   if (!started) {
     log_error("the daemon could not be started");
   } else {
@@ -414,7 +230,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
     wait_for_stop(srv, line, signals);
     control_close(srv->options->data, srv->control);
   }
-  stop(srv, workers);
+  parts_stop(srv, workers);
   return srv->unfit ? CONFIG_UNFIT : !started;
 }
 

@@ -10,8 +10,8 @@
 #   fuzz       each fuzz target for ORB_FUZZ_SECONDS (3) of CPU time
 #   core       only the library and its unit tests, where the daemon does not build; not part of a full run
 #
-# In a full run the tests in a browser, which run one at a time and mostly wait, run beside asan and release, and so do the
-# fuzz targets, in the time that the tests leave.
+# In a full run the tests in a browser, which run one at a time, run beside asan and release, and so do the fuzz targets,
+# in the time that the tests leave.
 #
 # A step that fails does not keep later steps from running. The last line is "N passed, N failed, N skipped", summed
 # over tests and fuzz targets; a step that fails outside a test counts as one failure. The exit status is 0 only if
@@ -48,7 +48,7 @@ run_tests() {
   local build=$1 status=0 jobs=$((3 * $(getconf _NPROCESSORS_ONLN)))
   shift
   rm -f "$build/tests.xml"
-  ctest --test-dir "$build" --output-on-failure --output-junit "$PWD/$build/tests.xml" -j $jobs "$@" || status=$?
+  "${behind[@]}" ctest --test-dir "$build" --output-on-failure --output-junit "$PWD/$build/tests.xml" -j $jobs "$@" || status=$?
   count_junit "$build/tests.xml" >>"$totals"
   return $status
 }
@@ -71,7 +71,7 @@ step_asan() {
   rm -f build-asan/tests.xml
   build_release
   cmake --preset asan -DORB_TESTS=ON -DORB_PLAIN="$PWD/build" >/dev/null
-  cmake --build build-asan
+  "${behind[@]}" cmake --build build-asan
   run_tests build-asan -R '^(unit|scenario)\.' -E "^scenario\.($release_only)\$"
 }
 
@@ -111,7 +111,10 @@ step_release() {
 
 # Starts the release build's tests in a browser beside the steps that follow. They have a folder of their own, as two
 # runs of ctest in one folder overwrite each other's logs.
-browser= browser_began=
+#
+# They are the longest chain of the run. At equal priority each gets a seventh of the processor beside six other tests, and
+# at the end one core waits for them; so what runs beside them yields to them.
+browser= browser_began= behind=()
 start_browser() {
   mkdir -p build/browser
   rm -f build/browser/tests.xml
@@ -119,6 +122,7 @@ start_browser() {
   ctest --test-dir build/browser --output-on-failure --output-junit "$PWD/build/browser/tests.xml" -L browser \
     >build/browser.log 2>&1 &
   browser=$! browser_began=$SECONDS
+  behind=(nice -n 5)
 }
 
 count_browser() {

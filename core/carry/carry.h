@@ -1,5 +1,5 @@
-/* Carrying what shapes have besides a surface onto the asset. orb_carrier_open() comes first; then the asset is written
- * with the carrier's splits and targets; then orb_carrier_add() adds the rest to it. */
+/* Copies what shapes have besides a surface to the asset. The caller calls orb_carrier_open(), writes the asset with
+ * the carrier's splits and targets, and calls orb_carrier_add(), which adds the rest. */
 #ifndef ORB_CARRY_CARRY_H
 #define ORB_CARRY_CARRY_H
 
@@ -52,7 +52,7 @@ ORB_MUST_CHECK orb_status orb_carrier_add(orb_context *ctx, const orb_carrier *c
 /* Whether orb_carrier_add() changes more of the asset than its splits and targets, so that it has no profiles. */
 int orb_carrier_edits(const orb_carrier *carrier);
 
-/* Removes what was carried from a list of what the asset lacks, and adds what of it was changed on the way. */
+/* Removes what was carried from the list of what the asset lacks, and adds what changed on the way. */
 ORB_MUST_CHECK orb_status orb_carried_settle(orb_context *ctx, const orb_carried *carried, int32_t count,
                                              orb_dropped **dropped, int32_t *dropped_count);
 

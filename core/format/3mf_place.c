@@ -5,6 +5,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "format/3mf_model.h"
+#include "format/build_finish.h"
 
 enum { NESTING_MAX = 32 };
 

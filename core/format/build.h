@@ -66,9 +66,6 @@ ORB_MUST_CHECK orb_status orb_build_texcoord(orb_build *build, const double texc
 ORB_MUST_CHECK orb_status orb_build_corner(orb_build *build, orb_corner corner, int64_t where);
 ORB_MUST_CHECK orb_status orb_build_face_end(orb_build *build, int64_t corners);
 
-/* A channel of a colour, 0 to 1. */
-float orb_srgb_to_linear(float c);
-
 /* Gives the named material to the faces to come. */
 ORB_MUST_CHECK orb_status orb_build_use_material(orb_build *build, const unsigned char *name, size_t length);
 
@@ -80,10 +77,6 @@ ORB_MUST_CHECK orb_status orb_build_drop(orb_build *build, const char *what, con
 
 /* Fails with ORB_E_MALFORMED_MESH at a line of a text (is_text) or at a byte offset. */
 orb_status orb_build_malformed(orb_context *ctx, int is_text, int64_t where, const char *format, ...) ORB_PRINTF(4, 5);
-
-/* Checks indices, cuts polygons, fills `out`. end: the last line or the size, where the error of a file without faces
- * points. */
-ORB_MUST_CHECK orb_status orb_build_finish(orb_build *build, int is_text, int64_t end, orb_mesh *out);
 
 /* Grows an array (the address of its pointer) to hold `need` elements of `element` bytes; *room: how many it holds. */
 ORB_MUST_CHECK orb_status orb_build_grow(orb_context *ctx, void *array, int64_t *room, int64_t need, size_t element);

@@ -1,10 +1,10 @@
 /* The readers: for each format a detector and a reader, defined in the file of its name and listed in
  * orbmorph/formats.h. Both get at least one byte. A reader fills an orb_build (build.h) and ends with
- * orb_build_finish(). */
+ * orb_build_finish() (build_finish.h). */
 #ifndef ORB_FORMAT_READERS_H
 #define ORB_FORMAT_READERS_H
 
-#include "format/build.h"
+#include "format/build_finish.h"
 
 /* How sure a detector is that bytes are of its format. The surest detector wins; of equally sure ones, the first in
  * that list. */

@@ -1,4 +1,4 @@
-/* Lists of what an asset lacks of a file. */
+/* Lists of what a file has and its asset lacks. */
 #ifndef ORB_MESH_DROPPED_H
 #define ORB_MESH_DROPPED_H
 

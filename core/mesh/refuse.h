@@ -1,4 +1,4 @@
-/* The errors with which a mesh is refused. Each function sets the error record, with the edges, vertices or pieces that
+/* The errors that refuse a mesh. Each function sets the error record, with the edges, vertices or pieces that
  * let the owner find the spot in the file, and returns its status. */
 #ifndef ORB_MESH_REFUSE_H
 #define ORB_MESH_REFUSE_H

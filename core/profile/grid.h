@@ -1,4 +1,4 @@
-/* Positions on a grid: base and targets become 16-bit integers, which the node's scale and translation take back. */
+/* Positions on a grid: base and targets become 16-bit integers, and the node's scale and translation undo that. */
 #ifndef ORB_PROFILE_GRID_H
 #define ORB_PROFILE_GRID_H
 

@@ -26,14 +26,14 @@ typedef struct orb_source {
   orb_source_view *views;
 } orb_source;
 
-/* Refers to the bytes. Every accessor lies within them. ORB_E_CORRUPT: not an asset of ours; ORB_E_NO_MEMORY. Free it
- * with orb_source_close(), also after an error. */
+/* Refers to the bytes. Every accessor lies within them. ORB_E_CORRUPT: orbmorph did not write it; ORB_E_NO_MEMORY. Free
+ * it with orb_source_close(), also after an error. */
 ORB_MUST_CHECK orb_status orb_source_open(orb_context *ctx, const unsigned char *bytes, size_t size, orb_source *out);
 void orb_source_close(orb_context *ctx, orb_source *source);
 
 /* The number of an accessor in an object such as `attributes`; −1: none. */
 int32_t orb_source_number(const cJSON *object, const char *name);
-/* Whether it is an accessor of float32 vectors with so many components and elements. */
+/* Whether it is an accessor of float32 vectors with this many components and elements. */
 int orb_source_is_floats(const orb_source *source, int32_t accessor, int32_t components, int32_t count);
 /* Copies the elements; element i becomes order[i] (order NULL: i). */
 void orb_source_floats(const orb_source *source, int32_t accessor, const uint32_t *order, float *out);

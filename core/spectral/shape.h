@@ -1,4 +1,4 @@
-/* What the spectral search knows of one shape: its lowest eigenfunctions and a few samples. */
+/* The spectral search's data of one shape: its lowest eigenfunctions and a few samples. */
 #ifndef ORB_SPECTRAL_SHAPE_H
 #define ORB_SPECTRAL_SHAPE_H
 

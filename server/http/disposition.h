@@ -1,4 +1,4 @@
-/* The names of downloads. */
+/* How downloads are named. */
 #ifndef ORB_HTTP_DISPOSITION_H
 #define ORB_HTTP_DISPOSITION_H
 

@@ -10,12 +10,12 @@ enum { TARGET_MEMORY = 16 * 1024 };
 /* Of a query; and of a target, with 64 bytes for each parameter. */
 enum { TARGET_PARAMETERS = 128, TARGET_BYTES = 10 * 1024 };
 
-/* When the memory of a connection is full, libmicrohttpd closes it or waits, without an answer. So a target that would
- * fill it is answered before it is taken apart, and headers that leave no room for an answer before one is made: with
- * 414 or 431, written to the socket or the TLS session past the library. 1: it was refused, and nothing may follow on
- * the connection. */
+/* When the memory of a connection is full, libmicrohttpd closes it or waits, without an answer. So this function
+ * answers two requests before libmicrohttpd gets that far: one whose target would fill the memory (414), and one whose
+ * headers leave no room for an answer (431). It writes to the socket or the TLS session past the library. 1: it refused
+ * the request, and nothing may follow on the connection. */
 int target_refused(const char *target, const char *number, struct MHD_Connection *connection);
-/* Once, when the headers have arrived. */
+/* Call it once, when the headers have arrived. */
 int target_headers_refused(const char *number, struct MHD_Connection *connection);
 
 #endif

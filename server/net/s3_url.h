@@ -1,7 +1,7 @@
 /* Where objects are in S3: s3://BUCKET[/PREFIX]?endpoint=URL&region=R[&path_style=1][&part_mib=N].
  *
- * All names that a request then carries consist of characters that S3's signatures encode as themselves, so no two ways
- * to encode a path can differ: that is what a bucket and a prefix may consist of.
+ * A bucket and a prefix may consist only of characters that S3's signatures encode as themselves. So there is one way
+ * only to encode a path.
  */
 #ifndef ORB_NET_S3_URL_H
 #define ORB_NET_S3_URL_H
@@ -15,7 +15,7 @@ typedef struct s3_place {
   char scheme[8];         /* http or https */
   char host[S3_HOST];     /* of requests, with the port unless it is the scheme's own; has the bucket or not */
   char base[S3_NAME + 2]; /* the path before a key: "/" or "/BUCKET/" */
-  int part_mib;           /* objects that are larger are sent in parts of so many MiB */
+  int part_mib;           /* objects that are larger are sent in parts of this many MiB */
 } s3_place;
 
 /* 0: *why says what is wrong, as the end of a sentence. */

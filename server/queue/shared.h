@@ -39,7 +39,7 @@ queue_result shared_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const 
 /* Under the lock: there may be jobs to claim; numbers over all nodes. */
 void shared_look(queue *q);
 void shared_count(const queue *q, int64_t now, queue_numbers *out);
-/* This node claims nothing for so long. */
+/* This node claims nothing for this long. */
 void shared_hold(queue *q, int64_t ms);
 /* Waits a while before the store is tried again. 0: the node stops. */
 int shared_pause(queue *q);

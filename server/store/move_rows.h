@@ -1,4 +1,4 @@
-/* All rows of a catalogue into another one, in whichever databases the two are.
+/* Copies all rows of a catalogue to another one, in whichever databases the two are.
  *
  * What triggers compute is not copied: sums of bytes, and the keys of lists of supermeshes. Rows come in an order that
  * foreign keys permit, in batches, each a transaction. Then the rows of each table are read again and compared by hash
@@ -9,7 +9,7 @@
 #include "store/database.h"
 #include "store/result.h"
 
-/* Empties `to` first, whose schema is up to date, like that of `from`. tell: called after each batch with the rows so
+/* Empties `to` first. The schemas of both are up to date. tell: called after each batch with the rows so
  * far. STORE_UNFIT: the two programs' tables differ. Logs what went wrong. */
 store_result move_rows(database *from, database *to, void (*tell)(void *user, int64_t rows), void *user);
 

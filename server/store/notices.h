@@ -13,11 +13,11 @@ notices *notices_open(const char *url); /* NULL: out of memory */
 void notices_close(notices *n);
 /* Whether it is connected; connects again if it is not. *fresh: it was not, so notices were lost. */
 int notices_connect(notices *n, int *fresh);
-/* Waits at most so long for notices, and calls `each` for those that came. A notice is a letter and what it is about:
+/* Waits at most this long for notices, and calls `each` for those that came. A notice is a letter and what it is about:
  * q, f (a job that computes or downloads can be claimed), j (a job has changed), e (a job has an event), c (a job is to
  * be cancelled), r (a kind, and the id of a row that has changed or gone), t (tokens or keys have changed). */
 void notices_wait(notices *n, int ms, void (*each)(void *user, const char *text), void *user);
-/* Renews the lease of the node for so long from now. 0: not done. */
+/* Renews the lease of the node for this long from now. 0: not done. */
 int notices_renew(notices *n, const char *node, int workers, int64_t lease_ms);
 /* Ends the lease: the node no longer runs jobs. */
 void notices_leave(notices *n, const char *node);

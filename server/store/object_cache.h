@@ -1,4 +1,4 @@
-/* Keeps a folder of copies below a number of bytes: what was used longest ago is deleted. Any thread. */
+/* Keeps a folder of copies below a number of bytes: it deletes the copies that were used longest ago. Any thread. */
 #ifndef ORB_STORE_OBJECT_CACHE_H
 #define ORB_STORE_OBJECT_CACHE_H
 
@@ -9,9 +9,9 @@ typedef struct object_cache object_cache;
 /* folder: of folders of folders of files. NULL: out of memory. */
 object_cache *object_cache_open(const char *folder, uint64_t most);
 void object_cache_close(object_cache *cache);
-/* To be called after a file was read through a descriptor, or put there: it was used now. */
+/* Notes that a file was used now. Call it after you read the file through a descriptor or put it there. */
 void object_cache_used(int fd);
-/* To be called after a file was put there. Deletes files if they are too many now. */
+/* Deletes files if they have become too many. Call it after you put a file there. */
 void object_cache_grew(object_cache *cache, uint64_t bytes);
 
 #endif

@@ -1,4 +1,4 @@
-/* Objects as files of a data folder, for objects.h, whose contract it is. Without state: root is the data folder. */
+/* Objects as files of a data folder. objects.h has the contract. No state: root is the data folder. */
 #ifndef ORB_STORE_OBJECT_FILES_H
 #define ORB_STORE_OBJECT_FILES_H
 

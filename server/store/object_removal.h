@@ -31,7 +31,7 @@ void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind 
 void objects_settle(objects *store);
 
 /* For --gc: an object without a row may be all that is left of a row that the catalogue lost, so it goes to the folder
- * lost+found first, and is deleted after a while. Called while others are excluded. */
+ * lost+found first; objects_purge_lost() deletes it later. Called while others are excluded. */
 store_result objects_set_aside(objects *store, object_kind kind, const char *id);
 /* Deletes what was set aside before a Unix time in seconds. Returns the number of files. */
 long objects_purge_lost(objects *store, int64_t before);

@@ -16,7 +16,7 @@
  * what is wrong. shared: several nodes use the database, as they do where objects are in a bucket. */
 store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out);
 
-/* What ties them together: a hash of the catalogue's secret, in these two files of the data folder and in the bucket.
+/* The tie between them: a hash of the catalogue's secret, in these two files of the data folder and in the bucket.
  */
 enum { PLACE_MARK = 2 * CATALOGUE_SECRET + 1 };
 extern const char place_catalogue[], place_objects[];

@@ -9,7 +9,7 @@ typedef enum store_result {
   STORE_FULL,     /* no space left */
   STORE_ERROR,    /* input/output error; logged */
   STORE_LOST,     /* objects may have been deleted since they were published: objects_hold_again() */
-  STORE_AWAY,     /* S3 does not answer, or refuses; it is asked until it is back; logged */
+  STORE_AWAY,     /* S3 does not answer, or refuses; the store asks until it is back; logged */
   STORE_UNFIT,    /* only of opening: the configuration is wrong, see store/place.h; logged */
 } store_result;
 

@@ -41,18 +41,18 @@ ENDLESS = {"step": 0.01, "growth": 1.01, "first_optimization": 1, "displacement_
            "max_iterations": 1000000}
 HEAD = """# Morphs by URL under load
 
-Written by `tests/bench/by_url_load.py`. The daemon answers `GET /v1/morph.glb` of a morph that exists, dog and giraffe of the
-samples; nginx serves the same bytes as a file. wrk, nginx, the daemon and the jobs share {cores} cores. Numbers are medians of
-{repeat} alternating runs of {seconds} s. The *ratio* is requests per second of the daemon over those of nginx, the smallest and
-largest of the runs in brackets. *Processor time* is that of the server and of wrk together for one request of each, in
-microseconds, and its ratio: about what the ratio of the rates would be on a machine without other load. Goals are checked against the
-rates. With *two jobs running*, two embeddings take every core that is left.
+Written by `tests/bench/by_url_load.py`. The daemon answers `GET /v1/morph.glb` of a morph that exists, dog and giraffe of
+the samples; nginx serves the same bytes as a file. wrk, nginx, the daemon and the jobs share {cores} cores. Numbers are
+medians of {repeat} alternating runs of {seconds} s. The *ratio* is requests per second of the daemon over those of nginx,
+the smallest and largest of the runs in brackets. *Processor time* is what a server and wrk use together for one request, in
+microseconds. Its ratio is about the ratio that the rates would have on a machine without other load. Goals are checked
+against the rates. With *two jobs running*, two embeddings take every core that is left.
 
-The daemon keeps assets of at most 4 MB in memory and beside it in a file without a name, from which the kernel sends them
-without a copy (`server/http/regions.h`); larger ones it sends from their files. In the row of *64 visitors* each of 64
-connections sends a request, reads the answer and pauses for {pause} ms, so that neither server is saturated; the two jobs and the
-visitors' own program share the cores, and nginx beside it shows what that costs. The load average of the machine
-at the end was {load:.0f}: with other load, rates and times say little, and processor time says more.
+The daemon keeps assets of at most 4 MB in memory, and in a file without a name, from which the kernel sends them without a
+copy (`server/http/regions.h`). It sends larger ones from their files. In the row of *64 visitors* each of 64 connections
+sends a request, reads the answer and pauses for {pause} ms, so that neither server is saturated. The two jobs and the
+visitors' own program share the cores; the column of nginx shows what that costs. The load average of the machine at the end
+was {load:.0f}: with other load, rates and times say little, and processor time says more.
 
 | what | daemon | nginx | ratio | processor time | goal | |
 |---|---|---|---|---|---|---|

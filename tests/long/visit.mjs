@@ -7,10 +7,10 @@
 import assert from 'node:assert/strict';
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { basename, join } from 'node:path';
+import { countPixels } from '../studio/pictures.mjs';
 import {
   addFiles,
   button,
-  countPixels,
   defaultShown,
   openPage,
   settled,

@@ -3,7 +3,8 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { addFiles, adopt, button, countPixels, defaultShown, json, openPage, settled, until } from './support.mjs';
+import { countPixels } from './pictures.mjs';
+import { addFiles, adopt, button, defaultShown, json, openPage, settled, until } from './support.mjs';
 
 const hot = (r, g, b) => r > 130 && r > 2 * g && r > 1.5 * b;
 

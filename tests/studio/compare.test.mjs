@@ -3,7 +3,8 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { browser, daemon } from './started.mjs';
 import { landmarked, landmarks, morph, seek } from './steps.mjs';
-import { addFiles, button, counted, difference, openPage, sample, settled, until } from './support.mjs';
+import { difference } from './pictures.mjs';
+import { addFiles, button, counted, openPage, sample, settled, until } from './support.mjs';
 
 test('side by side, the morph moves between its shapes under one camera', async () => {
   const { page, done } = await openPage(browser, daemon.url);

@@ -4,7 +4,8 @@ import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { join } from 'node:path';
 import { browser, daemon } from './started.mjs';
-import { difference, openPage, root, sample, until } from './support.mjs';
+import { difference } from './pictures.mjs';
+import { openPage, root, sample, until } from './support.mjs';
 
 let server;
 let url;

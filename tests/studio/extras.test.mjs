@@ -9,7 +9,8 @@ import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { writePng } from '../scenario/support/png.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { addFiles, button, countPixels, defaultShown, difference, json, openPage, settled, until } from './support.mjs';
+import { countPixels, difference } from './pictures.mjs';
+import { addFiles, button, defaultShown, json, openPage, settled, until } from './support.mjs';
 
 /** Texture coordinates by a projection; the picture has one colour, so front and back may share texels. */
 const charts = ({ positions }) => positions.map(([x, y]) => [0.5 + 0.2 * x, 0.5 + 0.2 * y]);

@@ -5,12 +5,12 @@ import { readFile } from 'node:fs/promises';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { landmarks, startOccupied } from './steps.mjs';
+import { countPixels } from './pictures.mjs';
 import {
   addFiles,
   button,
   clickView,
   counted,
-  countPixels,
   json,
   openPage,
   sample,

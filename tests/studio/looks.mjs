@@ -6,13 +6,13 @@ import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { obj, parse } from '../scenario/support/shapes.mjs';
 import { tunnels } from '../tools/tunnels.mjs';
+import { countPixels, halved } from './pictures.mjs';
 import {
   addFiles,
   counted,
   adopt,
   button,
   clickView,
-  countPixels,
   hideToasts,
   defaultShown,
   openPage,
@@ -200,84 +200,9 @@ export async function look(browser, url, name, whole = false) {
   await page.evaluate(() => document.activeElement?.blur());
   await settled(page);
   const full = await page.screenshot({ animations: 'disabled' });
-  const png = whole ? full : await halved(page, full);
+  const png = whole ? full : await halved(browser, full);
   await done();
   return png;
-}
-
-async function halved(page, png) {
-  const helper = await page.context().browser().newPage();
-  try {
-    const text = await helper.evaluate(async (data) => {
-      const bitmap = await createImageBitmap(
-        new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
-      );
-      const canvas = new OffscreenCanvas(bitmap.width >> 1, bitmap.height >> 1);
-      const context = canvas.getContext('2d');
-      context.imageSmoothingQuality = 'high';
-      context.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
-      // 32 levels per channel make the file a third as large; averaging over blocks hides the loss
-      const pixels = context.getImageData(0, 0, canvas.width, canvas.height);
-      for (let i = 0; i < pixels.data.length; i++)
-        if (i % 4 < 3) pixels.data[i] = Math.round(Math.round(pixels.data[i] / 8.226) * 8.226);
-      context.putImageData(pixels, 0, 0);
-      const bytes = new Uint8Array(await (await canvas.convertToBlob({ type: 'image/png' })).arrayBuffer());
-      let out = '';
-      for (let i = 0; i < bytes.length; i += 8192) out += String.fromCharCode(...bytes.subarray(i, i + 8192));
-      return btoa(out);
-    }, png.toString('base64'));
-    return Buffer.from(text, 'base64');
-  } finally {
-    await helper.close();
-  }
-}
-
-/**
- * Compares the mean colours (0 to 255) of blocks of 8 × 8 pixels. Returns the mean difference and the share of blocks
- * that differ by more than 20. Another GPU or font renderer draws edges differently, which averages out in a block; a
- * missing shape, colour or panel does not.
- */
-export async function apart(browser, a, b) {
-  const page = await browser.newPage();
-  try {
-    return await page.evaluate(
-      async (both) => {
-        const read = async (data) => {
-          const bitmap = await createImageBitmap(
-            new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
-          );
-          const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-          context.drawImage(bitmap, 0, 0);
-          return context.getImageData(0, 0, bitmap.width, bitmap.height);
-        };
-        const [x, y] = [await read(both[0]), await read(both[1])];
-        if (x.width !== y.width || x.height !== y.height)
-          return { size: [x.width, x.height, y.width, y.height], share: 1, mean: 255 };
-        const SIDE = 8;
-        let blocks = 0;
-        let many = 0;
-        let sum = 0;
-        for (let top = 0; top + SIDE <= x.height; top += SIDE)
-          for (let left = 0; left + SIDE <= x.width; left += SIDE) {
-            const d = [0, 0, 0];
-            for (let j = 0; j < SIDE; j++)
-              for (let i = 0; i < SIDE; i++)
-                for (let c = 0; c < 3; c++) {
-                  const at = 4 * ((top + j) * x.width + left + i) + c;
-                  d[c] += x.data[at] - y.data[at];
-                }
-            const far = Math.max(...d.map(Math.abs)) / (SIDE * SIDE);
-            blocks++;
-            sum += far;
-            if (far > 20) many++;
-          }
-        return { share: many / blocks, mean: sum / blocks };
-      },
-      [a.toString('base64'), b.toString('base64')],
-    );
-  } finally {
-    await page.close();
-  }
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {

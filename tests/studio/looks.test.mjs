@@ -5,7 +5,8 @@ import { existsSync } from 'node:fs';
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { apart, folder, look, SCENES } from './looks.mjs';
+import { folder, look, SCENES } from './looks.mjs';
+import { apart } from './pictures.mjs';
 import { browser, daemon } from './started.mjs';
 
 for (const name of Object.keys(SCENES))

@@ -4,7 +4,8 @@ import assert from 'node:assert/strict';
 import { figure, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { landmarks, morph, shownId } from './steps.mjs';
-import { addFiles, button, countPixels, json, openPage, sample, settled, until } from './support.mjs';
+import { countPixels } from './pictures.mjs';
+import { addFiles, button, json, openPage, sample, settled, until } from './support.mjs';
 
 const said = (page) => page.getByRole('status', { name: 'How sure the match is' });
 const says = (page, pattern, what) => until(async () => pattern.test(await said(page).innerText()), what);

@@ -5,7 +5,8 @@ import { readFile } from 'node:fs/promises';
 import { rigged } from '../samples/rigged.mjs';
 import { grating, obj, torus } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { button, countPixels, json, openPage, sample, settled, until } from './support.mjs';
+import { countPixels } from './pictures.mjs';
+import { button, json, openPage, sample, settled, until } from './support.mjs';
 
 const red = (page) => countPixels(page, '.pane-view', (r, g, b) => r > 180 && g < 110 && b < 110);
 const digits = (text) => Number(text.replace(/\D/g, ''));

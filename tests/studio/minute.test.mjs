@@ -7,18 +7,8 @@ import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { browser, daemon } from './started.mjs';
-import {
-  addFiles,
-  counted,
-  button,
-  countPixels,
-  defaultShown,
-  difference,
-  openPage,
-  sample,
-  settled,
-  until,
-} from './support.mjs';
+import { countPixels, difference } from './pictures.mjs';
+import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
 import { morphOf } from '../scenario/support/glb.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { readPng, writePng } from '../scenario/support/png.mjs';

@@ -4,7 +4,8 @@ import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
 import { browser, daemon } from './started.mjs';
-import { addFiles, counted, button, difference, defaultShown, openPage, sample, settled, until } from './support.mjs';
+import { difference } from './pictures.mjs';
+import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
 
 let axe;
 before(async () => {

@@ -172,56 +172,6 @@ export async function addFiles(page, ...files) {
 export const defaultShown = (page) =>
   until(() => page.getByText('Shown: the default morph.').count(), 'the default morph');
 
-/** Counts the pixels in a screenshot of `selector` that `test(r, g, b)` accepts. */
-export async function countPixels(page, selector, test) {
-  const png = await page.locator(selector).first().screenshot();
-  return page.evaluate(
-    async ({ data, source }) => {
-      const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);
-      const bitmap = await createImageBitmap(
-        new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
-      );
-      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-      const context = canvas.getContext('2d');
-      context.drawImage(bitmap, 0, 0);
-      const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-      let count = 0;
-      for (let i = 0; i < pixels.length; i += 4) if (accept(pixels[i], pixels[i + 1], pixels[i + 2])) count++;
-      return count;
-    },
-    { data: png.toString('base64'), source: test.toString() },
-  );
-}
-
-/** The share of pixels that differ by more than 24 of 255 between two screenshots. */
-export async function difference(browser, a, b) {
-  const page = await browser.newPage();
-  try {
-    return await page.evaluate(
-      async (both) => {
-        const read = async (data) => {
-          const bitmap = await createImageBitmap(
-            new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
-          );
-          const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-          context.drawImage(bitmap, 0, 0);
-          return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-        };
-        const [x, y] = [await read(both[0]), await read(both[1])];
-        if (x.length !== y.length) return 1;
-        let count = 0;
-        for (let i = 0; i < x.length; i += 4)
-          if (Math.max(Math.abs(x[i] - y[i]), Math.abs(x[i + 1] - y[i + 1]), Math.abs(x[i + 2] - y[i + 2])) > 24)
-            count++;
-        return count / (x.length / 4);
-      },
-      [a.toString('base64'), b.toString('base64')],
-    );
-  } finally {
-    await page.close();
-  }
-}
-
 /** Clicks into a view; `x` and `y` are fractions of its width and height. */
 export async function clickView(page, index, x, y) {
   const box = await page.locator('.pane-view').nth(index).boundingBox();

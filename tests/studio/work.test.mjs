@@ -9,12 +9,11 @@ import { promisify } from 'node:util';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { landmarked, landmarks, morph, scrubber, seek, shownId, slide, startOccupied } from './steps.mjs';
+import { countPixels, difference } from './pictures.mjs';
 import {
   addFiles,
   button,
   counted,
-  countPixels,
-  difference,
   hideToasts,
   json,
   openPage,

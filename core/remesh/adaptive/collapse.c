@@ -21,6 +21,7 @@
 #include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "remesh/adaptive/fill.h"
+#include "remesh/adaptive/heap.h"
 #include "remesh/adaptive/quadric.h"
 #include "remesh/placed/bound.h"
 #include "remesh/placed/form.h"
@@ -29,7 +30,6 @@
 enum { RING_MAX = 48 };    /* vertices with more neighbours stay; the size of arrays on the stack */
 enum { VALENCE_MAX = 14 }; /* a collapse must not give a vertex more neighbours than this, or than it has */
 enum { TRIES = 4 };        /* targets tried for a vertex, the cheapest first; more find a few more collapses */
-enum { WAYS = 4 };         /* children of a heap entry: a flatter heap than a binary one, faster in the cache */
 /* A batch holds at most BATCH_MOST vertices and one in BATCH_PART of the heap: larger batches keep more threads busy
  * and depart farther from the order of cost. A thread takes BATCH_GRAIN at a time. */
 enum { BATCH_MOST = 256, BATCH_PART = 32, BATCH_GRAIN = 4 };
@@ -37,12 +37,6 @@ enum { GRAIN = 512 }; /* vertices a thread takes at a time when all get their qu
 /* Weight of the squared distance in the cost, in units of the squared limit: small against any quadric, but enough that
  * flat regions keep even triangles. */
 static const double DISTANCE_WEIGHT = 1e-5;
-
-/* The cost of a vertex's best target. */
-typedef struct heap_entry {
-  double cost;
-  int32_t v;
-} heap_entry;
 
 /* What was found for a vertex: a way to remove it, or none. */
 typedef struct plan {
@@ -60,73 +54,13 @@ typedef struct collapser {
   double limit2;
   int strict, thorough;
   orb_quadric *quadric; /* per net vertex, one a shape */
-  double *cost;         /* per vertex: of its best target */
+  orb_heap heap;        /* vertices by the cost of their best target */
   int32_t *target;      /* per vertex: its best target */
-  heap_entry *heap;     /* no entry costs more than its WAYS children */
-  int32_t *slot;        /* per vertex: its index in the heap, −1: not in it */
-  int32_t heap_count;
   int64_t live;
   plan *batch;
   int32_t *later, waiting;  /* taken from the heap but too near to the batch: for the next one */
   uint32_t *taken, batches; /* per vertex: the last batch that it or a neighbour was in */
 } collapser;
-
-static int is_less(heap_entry a, heap_entry b) {
-  return a.cost < b.cost || (a.cost == b.cost && a.v < b.v);
-}
-
-static void heap_set(collapser *c, int32_t i, heap_entry entry) {
-  c->heap[i] = entry;
-  c->slot[entry.v] = i;
-}
-
-/* Puts an entry at index i, which is free, or higher or lower. */
-static void sift(collapser *c, int32_t i, heap_entry entry) {
-  int32_t begin = i;
-  for (int32_t above; i > 0 && is_less(entry, c->heap[above = (i - 1) / WAYS]); i = above) {
-    heap_set(c, i, c->heap[above]);
-  }
-  while (i >= begin) {
-    int32_t first = WAYS * i + 1, least = first;
-    if (first >= c->heap_count) {
-      break;
-    }
-    int32_t last = first + WAYS < c->heap_count ? first + WAYS : c->heap_count;
-    for (int32_t k = first + 1; k < last; k++) {
-      least = is_less(c->heap[k], c->heap[least]) ? k : least;
-    }
-    if (!is_less(c->heap[least], entry)) {
-      break;
-    }
-    heap_set(c, i, c->heap[least]);
-    i = least;
-  }
-  heap_set(c, i, entry);
-}
-
-static void heap_remove(collapser *c, int32_t v) {
-  int32_t i = c->slot[v];
-  if (i < 0) {
-    return;
-  }
-  c->slot[v] = -1;
-  heap_entry last = c->heap[--c->heap_count];
-  if (i < c->heap_count) {
-    sift(c, i, last);
-  }
-}
-
-static void heap_put(collapser *c, int32_t v, double cost) {
-  if (c->slot[v] >= 0 && c->cost[v] == cost) {
-    return;
-  }
-  c->cost[v] = cost;
-  if (!(cost < INFINITY)) {
-    heap_remove(c, v);
-    return;
-  }
-  sift(c, c->slot[v] < 0 ? c->heap_count++ : c->slot[v], (heap_entry){cost, v});
-}
 
 /* The neighbours of u in counter-clockwise order; returns how many, −1 if too many. */
 static int ring_of(const orb_net *net, int32_t u, int32_t ring[RING_MAX]) {
@@ -174,11 +108,11 @@ static double least_cost_after(collapser *c, int32_t u, int32_t gone, int32_t v)
     return least_cost(c, u, &c->target[u]);
   }
   double cost = move_cost(c, u, v);
-  if (cost < c->cost[u]) {
+  if (cost < c->heap.cost[u]) {
     c->target[u] = v;
     return cost;
   }
-  return c->cost[u];
+  return c->heap.cost[u];
 }
 
 /* Whether the forms of the fan around ring[0] may replace those of u's star: see orb_form_allows(). */
@@ -427,13 +361,13 @@ static int take(collapser *c, int32_t u, plan *p) {
 
 /* Fills the next batch: first the vertices that had to wait, then from the heap. Returns how many there are. */
 static int take_batch(collapser *c) {
-  int32_t all = c->heap_count + c->waiting;
+  int32_t all = c->heap.count + c->waiting;
   int most = all / BATCH_PART < BATCH_MOST ? all / BATCH_PART + 1 : BATCH_MOST, count = 0, waited = c->waiting;
   c->batches++;
   c->waiting = 0;
   for (int i = 0; i < waited; i++) {
     int32_t u = c->later[i];
-    if (c->slot[u] >= 0) {
+    if (c->heap.slot[u] >= 0) {
       continue; /* it is back in the heap with another cost */
     }
     if (count < most && take(c, u, &c->batch[count])) {
@@ -442,9 +376,9 @@ static int take_batch(collapser *c) {
       c->later[c->waiting++] = u;
     }
   }
-  while (c->heap_count > 0 && count < most && c->waiting < BATCH_MOST) {
-    int32_t u = c->heap[0].v;
-    heap_remove(c, u);
+  while (c->heap.count > 0 && count < most && c->waiting < BATCH_MOST) {
+    int32_t u = c->heap.entry[0].v;
+    orb_heap_remove(&c->heap, u);
     if (take(c, u, &c->batch[count])) {
       count++;
     } else {
@@ -470,7 +404,7 @@ static void try_batch(collapser *c, int64_t target) {
   for (int i = 0; i < count; i++) {
     const plan *p = &c->batch[i];
     for (int k = 0; k < p->n && (p->at >= 0 || p->fills); k++) {
-      heap_put(c, p->ring[k], p->cost[k]);
+      orb_heap_put(&c->heap, p->ring[k], p->cost[k]);
     }
   }
 }
@@ -507,7 +441,7 @@ static void cost_range(void *arg, int64_t begin, int64_t end, int thread) {
   collapser *c = arg;
   for (int64_t v = begin; v < end; v++) {
     if (c->placed->net.out[v] >= 0) {
-      c->cost[v] = least_cost(c, (int32_t)v, &c->target[v]);
+      c->heap.cost[v] = least_cost(c, (int32_t)v, &c->target[v]);
     }
   }
 }
@@ -522,36 +456,28 @@ orb_status orb_adaptive_collapse(orb_context *ctx, orb_placed_net *placed, doubl
                  .thorough = thorough,
                  .live = orb_placed_live(placed)};
   c.quadric = ORB_NEW(ctx, orb_quadric, (int64_t)vertices * placed->shape_count);
-  c.cost = ORB_NEW(ctx, double, vertices);
   c.target = ORB_NEW(ctx, int32_t, vertices);
-  c.heap = ORB_NEW(ctx, heap_entry, vertices);
-  c.slot = ORB_NEW(ctx, int32_t, vertices);
   c.batch = ORB_NEW(ctx, plan, BATCH_MOST);
   c.later = ORB_NEW(ctx, int32_t, BATCH_MOST);
   c.taken = ORB_NEW0(ctx, uint32_t, vertices);
-  int fine = c.quadric && c.cost && c.target && c.heap && c.slot && c.batch && c.later && c.taken;
+  int fine = orb_heap_open(ctx, &c.heap, vertices) && c.quadric && c.target && c.batch && c.later && c.taken;
   orb_status status = fine ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
     orb_parallel_for(ctx, vertices, GRAIN, quadric_range, &c);
     orb_parallel_for(ctx, vertices, GRAIN, cost_range, &c);
     for (int32_t v = 0; v < vertices; v++) {
-      c.slot[v] = -1;
-    }
-    for (int32_t v = 0; v < vertices; v++) {
       if (placed->net.out[v] >= 0) {
-        heap_put(&c, v, c.cost[v]);
+        orb_heap_put(&c.heap, v, c.heap.cost[v]);
       }
     }
   }
-  while (status == ORB_OK && c.heap_count + c.waiting > 0 && c.live > target && c.live > 4) {
+  while (status == ORB_OK && c.heap.count + c.waiting > 0 && c.live > target && c.live > 4) {
     try_batch(&c, target);
     status = orb_context_check(ctx);
   }
+  orb_heap_close(ctx, &c.heap);
   orb_free(ctx, c.quadric);
-  orb_free(ctx, c.cost);
   orb_free(ctx, c.target);
-  orb_free(ctx, c.heap);
-  orb_free(ctx, c.slot);
   orb_free(ctx, c.batch);
   orb_free(ctx, c.later);
   orb_free(ctx, c.taken);

@@ -1,10 +1,11 @@
-/* What every remesh method gets: the shapes and what orb_remesh() has prepared for each. */
+/* The input of every remesh method: the shapes, and what orb_remesh() prepares for each. */
 #ifndef ORB_REMESH_COMMON_JOB_H
 #define ORB_REMESH_COMMON_JOB_H
 
 #include "orbmorph/remesh.h"
 
-/* What proofs of distance leave for the rounding of a bound: relative to the tolerance, and relative to the diagonal.
+/* The margin that proofs of distance leave for the rounding of a bound: relative to the tolerance, and relative to the
+ * diagonal.
  */
 static const double ORB_REMESH_ROUNDING = 1e-9, ORB_REMESH_ROUNDING_LEAST = 1e-12;
 
