@@ -249,9 +249,9 @@ static void write_suspects(const api_supermesh_request *request, const orb_align
   api_json_close(out, ']');
 }
 
-/* From these confidences on a match is likely, and sure. docs/bench-confidence.md says how often a sure one is right;
+/* From this confidence on a match is sure. docs/bench-confidence.md says how often a sure one is right;
  * no lower one is promised. */
-static const double LIKELY = 0.5, SURE = 0.8;
+static const double SURE = 0.8;
 
 /* How far the correspondence that was found may be relied on; nothing where none was searched. */
 static void write_match(const orb_match_facts *match, api_text *out) {
@@ -262,9 +262,9 @@ static void write_match(const orb_match_facts *match, api_text *out) {
   api_json_open(out, '{');
   api_json_member_number(out, "confidence", match->confidence);
   api_json_member_string(out, "verdict",
-                         match->confidence >= SURE     ? "sure"
-                         : match->confidence >= LIKELY ? "likely"
-                                                       : "unsure");
+                         match->confidence >= SURE               ? "sure"
+                         : match->confidence >= ORB_MATCH_LIKELY ? "likely"
+                                                                 : "unsure");
   api_json_member_number(out, "clear", match->clear);
   api_json_member_number(out, "lead", match->lead);
   api_json_member_number(out, "bend", match->bend);

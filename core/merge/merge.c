@@ -183,6 +183,15 @@ static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, in
   return ORB_OK;
 }
 
+/* An unsure match rotates no shape. */
+static orb_merge_options for_match(const orb_merge_options *options, const orb_match_facts *match) {
+  orb_merge_options believed = *options;
+  if (options->asset.fit == ORB_FIT_AUTO && match->is_measured && match->confidence < ORB_MATCH_LIKELY) {
+    believed.asset.fit = ORB_FIT_AUTO_UNSURE;
+  }
+  return believed;
+}
+
 orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                              int32_t shape_count, const orb_landmark *landmarks, orb_alignment *alignment,
                              const orb_merge_options *options, orb_merge_result *out) {
@@ -207,7 +216,8 @@ orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, co
   ORB_GO(status, transfer_reports(ctx, shapes, landmarks, &remesh, out), fail);
   out->timings.transfer = (now = orb_clock()) - mark;
   mark = now;
-  ORB_GO(status, write_asset(ctx, shapes, shape_count, names, options, out), fail);
+  const orb_merge_options believed = for_match(options, &out->alignment.match);
+  ORB_GO(status, write_asset(ctx, shapes, shape_count, names, &believed, out), fail);
   out->timings.write = (now = orb_clock()) - mark;
   out->timings.total = now - start;
   return ORB_OK;

@@ -16,6 +16,9 @@ static const double SCALE_DIFFERS = 1.5, DEGREES_DIFFER = 30, DIAGONALS_DIFFER =
 /* AUTO: a shape keeps its posture where that makes the sum of squared distances at most this many times as large: of a
  * dog and a giraffe 1.5 (15°), of an armadillo and a penguin 1.4 (21°). Copies of one shape have no such distances. */
 static const double POSTURE_WORSE = 2;
+/* AUTO_UNSURE: a fit that leaves less than this share of the spread is one of a shape to its like, such as two
+ * cylinders, whichever parts correspond. Copies leave 0.001, a cow whose head went to a hind leg 0.03. */
+static const double LIKE = 0.01;
 
 /* Weighted points of both shapes. index NULL: all vertices; weight NULL: 1. */
 typedef struct fit_points {
@@ -120,8 +123,10 @@ static void nearest_right_angles(double rotation[3][3], double out[3][3]) {
 
 /* The axes of files differ by right angles. What a rotation has beyond these, if it is too little to be a difference of
  * frames, comes from the shapes' postures: without it a shape stands as upright as in its file. Copies of one shape fit
- * far worse without it, and keep their rotation. spread: Σ w b·b. */
-static void drop_posture(double rotation[3][3], double h[3][3], double scale, double spread) {
+ * far worse without it, and keep their rotation. If the correspondence may be wrong, so may all of the rotation be.
+ * spread: Σ w b·b. */
+static void drop_posture(double rotation[3][3], double h[3][3], double scale, double spread, orb_fit fit) {
+  static const double stay[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   double right[3][3], trace = 0;
   nearest_right_angles(rotation, right);
   for (int i = 0; i < 9; i++) {
@@ -129,9 +134,15 @@ static void drop_posture(double rotation[3][3], double h[3][3], double scale, do
   }
   const double degrees = acos(fmax(-1, fmin(1, (trace - 1) / 2))) * 180 / M_PI;
   const double off = spread - scale * overlap(rotation, h), right_off = spread - scale * overlap(right, h);
-  if (degrees <= DEGREES_DIFFER && right_off <= POSTURE_WORSE * off) {
+  if (fit == ORB_FIT_AUTO_UNSURE && off > LIKE * spread) {
+    memcpy(rotation, stay, sizeof stay);
+  } else if (degrees <= DEGREES_DIFFER && right_off <= POSTURE_WORSE * off) {
     memcpy(rotation, right, sizeof right);
   }
+}
+
+static int is_auto(orb_fit fit) {
+  return fit == ORB_FIT_AUTO || fit == ORB_FIT_AUTO_UNSURE;
 }
 
 static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
@@ -154,8 +165,8 @@ static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
   orb_rotation_matrix(q, rotation);
   out->scale = fit != ORB_FIT_RIGID && spread_moved > 0 && spread_fixed > 0 ? sqrt(spread_fixed / spread_moved) : 1;
   out->moves = sqrt(orb_distance2(fixed, moved));
-  if (fit == ORB_FIT_AUTO) {
-    drop_posture(rotation, h, out->scale, spread_fixed);
+  if (is_auto(fit)) {
+    drop_posture(rotation, h, out->scale, spread_fixed, fit);
   }
   memcpy(out->rotation, rotation, sizeof rotation);
   for (int c = 0; c < 3; c++) {
@@ -210,7 +221,7 @@ orb_status orb_fit_motion(orb_context *ctx, const orb_supermesh *supermesh, cons
     }
     out->kind = fit == ORB_FIT_RIGID ? ORB_FIT_RIGID : ORB_FIT_SIMILARITY;
     solve(&points, fit, out);
-    if (fit == ORB_FIT_AUTO && !frames_differ(out, orb_fit_diagonal(fixed, supermesh->vertex_count))) {
+    if (is_auto(fit) && !frames_differ(out, orb_fit_diagonal(fixed, supermesh->vertex_count))) {
       *out = stay;
     }
   }

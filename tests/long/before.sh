@@ -1,8 +1,11 @@
 #!/bin/bash
-# Runs scenarios of this version against the daemon of an older one, to see which of them fail there, and why.
-#   tests/long/before.sh PROGRAM SCENARIO…      PROGRAM: the older orbmorphd
+# Runs tests of this version against the daemon of an older one, to see which of them fail there, and why.
+#   tests/long/before.sh PROGRAM TEST…      PROGRAM: the older orbmorphd
+# A test is a scenario, such as jobs, or a test of the studio, such as studio.first. For these the older daemon must have
+# been built with its studio. ORBMORPH: the command line, this version's by default.
 # Options that the older daemon does not know are omitted, with their values. Its address space is limited, since some
-# scenarios make it take all memory. ORB_BEFORE_TESTS: only tests whose names match.
+# scenarios make it take all memory. ORB_BEFORE_TESTS: only tests whose names match. ORB_BEFORE_WAIT: seconds that a test
+# of the studio waits for what should come.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 old=$(realpath "$1")
@@ -26,11 +29,14 @@ done
 exec "$old" "\${args[@]}"
 END
 chmod +x "$at/orbmorphd"
-export ORBMORPHD=$at/orbmorphd ORBMORPH=${ORBMORPH:-$PWD/build/bin/orbmorph}
+wait=${ORB_BEFORE_WAIT:-20}
+export ORBMORPHD=$at/orbmorphd ORB_DAEMON=$at/orbmorphd ORBMORPH=${ORBMORPH:-$PWD/build/bin/orbmorph}
+export ORB_PATIENCE=${wait}000 ORB_LIMIT=${wait}000
 for name in "$@"; do
-  echo "== scenario.$name"
+  [[ $name == *.* ]] || name=scenario.$name
+  echo "== $name"
   timeout "$seconds" node --test --test-timeout="${seconds}000" ${ORB_BEFORE_TESTS:+"--test-name-pattern=$ORB_BEFORE_TESTS"} \
-    "tests/scenario/$name.test.mjs" >"$at/out" 2>&1 || [ $? -ne 124 ] || echo "not ok: stopped after $seconds s"
+    "tests/${name/.//}.test.mjs" >"$at/out" 2>&1 || [ $? -ne 124 ] || echo "not ok: stopped after $seconds s"
   awk '/^# Subtest:/ { test = substr($0, 12) }
     /^(not )?ok / { print }
     /^  error:/ { want = 1; rest = $0; sub(/^ *error: */, "", rest); if (rest != "|-") { print "    " rest; want = 0 }; next }

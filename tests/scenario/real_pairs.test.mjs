@@ -68,3 +68,14 @@ test('every pair merges', { skip }, async (t) => {
     });
   }
 });
+
+// Both files stand with y up. Without landmarks the cow's head may go to a leg of Spot; the verdict then says so.
+test('a match of two standing animals leaves both standing', { skip: skip || (slow && 'takes minutes') }, async (t) => {
+  const d = await daemon(t);
+  const cow = real.pairs().find((pair) => pair.name === 'cow-spot');
+  const list = [];
+  for (const file of cow.files) list.push({ mesh: (await d.mesh(file)).id });
+  const made = await d.made('/v1/supermeshes', { shapes: list });
+  const { up_degrees } = made.shapes[1].fit;
+  assert.ok(up_degrees < 30, `${made.match.verdict}, and the up axis rotates by ${up_degrees}°`);
+});

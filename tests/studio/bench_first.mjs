@@ -43,6 +43,7 @@ async function round(browser, pair, marks) {
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => page.evaluate(() => globalThis.times.fast), 'the fast morph');
   await defaultShown(page);
+  await until(() => page.evaluate(() => globalThis.times.default), 'the default morph');
   const times = await page.evaluate(() => globalThis.times);
   await done();
   await daemon.stop();

@@ -11,7 +11,7 @@ import { chromium } from 'playwright-core';
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 export const sample = (name) => join(root, 'tests/samples', name);
 
-const PATIENCE = 180_000; // ms; only a failing test waits that long
+const PATIENCE = Number(process.env.ORB_PATIENCE ?? 180_000); // ms; only a failing test waits that long
 
 /** `keep`: do not delete the folder, so that a later daemon can use it through `data`. */
 export async function startDaemon({

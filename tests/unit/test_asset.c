@@ -368,6 +368,42 @@ static void auto_leaves_a_posture(void **state) {
   synthetic_free(ctx, &made);
 }
 
+/* A pear, and a wider one, rotated by 50° and three times as large. */
+static void mistaken_copy(int32_t shape, const double p[3], double out[3]) {
+  const double q[3] = {p[0] * (1.2 - p[1]), 2 * p[1], p[2] * (1.2 - p[1])};
+  const double turn = shape ? 50 * M_PI / 180 : 0, scale = shape ? 3 : 1, wide = shape ? 1.5 : 1;
+  out[0] = scale * wide * (cos(turn) * q[0] - sin(turn) * q[1]);
+  out[1] = scale * (sin(turn) * q[0] + cos(turn) * q[1]);
+  out[2] = scale * q[2];
+}
+
+/* A match that may be wrong rotates no shape, but scales it: unless one shape is a copy of the other, however turned.
+ */
+static void an_unsure_match_rotates_nothing(void **state) {
+  orb_context *ctx = *state;
+  static const struct {
+    void (*copy)(int32_t shape, const double p[3], double out[3]);
+    orb_fit fit;
+    int turns;
+  } cases[] = {
+      {mistaken_copy, ORB_FIT_AUTO, 1}, {mistaken_copy, ORB_FIT_AUTO_UNSURE, 0}, {placed_copy, ORB_FIT_AUTO_UNSURE, 1}};
+  copy_scale = 3, copy_turn = 50, copy_axis = 2, copy_shift = 0;
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    synthetic made = synthetic_make(ctx, 3, 2, cases[i].copy);
+    orb_fit_report reports[2];
+    double m[32];
+    assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, cases[i].fit, m, reports), ORB_OK);
+    assert_int_equal(reports[1].kind, ORB_FIT_SIMILARITY);
+    assert_true(reports[1].scale > 1 / 4.5 && reports[1].scale < 1 / 2.9);
+    if (cases[i].turns) {
+      assert_true(reports[1].rotation_degrees > 30);
+    } else {
+      assert_true(reports[1].rotation_degrees == 0 && reports[1].up_degrees == 0);
+    }
+    synthetic_free(ctx, &made);
+  }
+}
+
 /* The matrix of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
 static void the_transform_is_the_inverse(void **state) {
   orb_context *ctx = *state;
@@ -573,6 +609,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, setup, teardown),
       cmocka_unit_test_setup_teardown(fit_undoes_a_similarity, setup, teardown),
       cmocka_unit_test_setup_teardown(auto_leaves_a_posture, setup, teardown),
+      cmocka_unit_test_setup_teardown(an_unsure_match_rotates_nothing, setup, teardown),
       cmocka_unit_test_setup_teardown(the_transform_is_the_inverse, setup, teardown),
       cmocka_unit_test_setup_teardown(auto_fits_what_clearly_differs, setup, teardown),
       cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, setup, teardown),

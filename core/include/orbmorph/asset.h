@@ -11,8 +11,11 @@ extern "C" {
 /* AUTO: SIMILARITY for the shapes whose frame clearly differs from the first one's: larger or smaller by a factor of
  * more than 1.5, rotated by more than 30°, or farther away than half the diagonal of the first shape; NONE for the
  * others. If a rotation by right angles lies within 30° of the best rotation and fits nearly as well, AUTO uses it:
- * such differences come from the axes of the file, and smaller ones from the posture of the shape. */
-typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY, ORB_FIT_AUTO } orb_fit;
+ * such differences come from the axes of the file, and smaller ones from the posture of the shape.
+ * AUTO_UNSURE: AUTO for a correspondence that may be wrong. Shapes are scaled and moved, but not rotated, unless they
+ * fit so well that it does not matter which parts correspond. orb_merge() takes it for AUTO where the match is unsure.
+ */
+typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY, ORB_FIT_AUTO, ORB_FIT_AUTO_UNSURE } orb_fit;
 typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } orb_animation;
 typedef enum orb_holes { ORB_HOLES_REOPEN = 0, ORB_HOLES_FILLED } orb_holes;
 typedef enum orb_path { ORB_PATH_LINEAR = 0, ORB_PATH_RIGID } orb_path;
