@@ -47,8 +47,17 @@ static orb_status smooth_targets(orb_map_run *c) {
   return status;
 }
 
-static orb_status start_from_targets(orb_map_run *c) {
+/* The targets of the first start. Walks take samples of the targets themselves. */
+static orb_status register_first(orb_map_run *c) {
+  return c->walks_first ? orb_map_register(c, 0) : smooth_targets(c);
+}
+
+/* From the targets that the first start has not followed: the smooth ones, or those as given, which are registered. */
+static orb_status start_from_others(orb_map_run *c) {
   allow(c);
+  if (c->walks_first) {
+    ORB_TRY(smooth_targets(c));
+  }
   return orb_map_run_start(c, ORB_MAP_SPATIAL);
 }
 
@@ -91,7 +100,7 @@ static orb_status run_passes(orb_map_run *c) {
 /* The first start. *walked: it is a walk. */
 static orb_status run_first(orb_map_run *c, int *walked) {
   const double given = c->best_energy;
-  ORB_TRY(smooth_targets(c));
+  ORB_TRY(register_first(c));
   ORB_TRY(orb_map_levels_prepare(c));
   if (c->walks_first) {
     ORB_TRY(start_guided(c));
@@ -123,7 +132,7 @@ static orb_status run_starts(orb_map_run *c) {
   if (c->best_energy > p->energy.poor) {
     ORB_TRY(start_coarser(c));
   }
-  return c->best_energy > p->energy.poor ? start_from_targets(c) : ORB_OK;
+  return c->best_energy > p->energy.poor ? start_from_others(c) : ORB_OK;
 }
 
 /* A walk has few crumples, which draws would smooth. */
