@@ -78,7 +78,7 @@ static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0
 static const double ORB_FIND_HINT_OFF = 0.5;
 
 /* The energy of the map that such a match leads to, above which all other starts are tried as well: shrec397 to
- * shrec393 has 3.1, and 1.4 from others; right maps of people have at most 1.5. */
+ * shrec393 had 3.1 from noisy targets, and 1.4 from other starts; right maps of people have at most 1.5. */
 static const double ORB_FIND_POSED_POOR = 1.8;
 
 /* Found landmarks (found.c). */
