@@ -390,6 +390,17 @@ end:
   return status;
 }
 
+/* Do rotations alone make the given spheres correspond? Then areas say more than angles. */
+static orb_status are_alike(orb_context *ctx, orb_alignment *a, orb_preset preset, int *alike) {
+  *alike = 1;
+  for (int32_t s = 1; s < a->shape_count && *alike; s++) {
+    double energy;
+    ORB_TRY(orb_compose_energy(ctx, &a->shapes[0], &a->shapes[s], preset, &energy));
+    *alike = energy <= ORB_FIND_ALIKE;
+  }
+  return ORB_OK;
+}
+
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *out) {
   orb_align_options rotated = *options;
@@ -398,7 +409,7 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   orb_status status = ORB_OK;
   int alike = 1;
   if (options->preset != ORB_PRESET_FAST) {
-    ORB_GO(status, orb_align_are_alike(ctx, out, options->preset, &alike), end);
+    ORB_GO(status, are_alike(ctx, out, options->preset, &alike), end);
     status = alike ? align_rotated(ctx, shapes, shape_count, 0, options, out)
                    : align_even(ctx, shapes, shape_count, &rotated, options, out);
   } else {
