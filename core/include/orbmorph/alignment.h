@@ -61,11 +61,12 @@ typedef struct orb_alternative {
   orb_place *at; /* count × shape_count places, on the given meshes */
 } orb_alternative;
 
+/* A match below this confidence is unsure. */
+#define ORB_MATCH_LIKELY 0.5
+
 /* What the search without landmarks knows of its best rough map; with several later shapes, each
  * member holds the worst value. If a rotation of the spheres already gives a good map, the alignment uses that rotation
  * and not the rough map. */
-#define ORB_MATCH_LIKELY 0.5 /* below this confidence a match is unsure */
-
 typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
   double bend;         /* of the best rough map: 0 for a rigid motion */
