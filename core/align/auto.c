@@ -14,6 +14,7 @@
 #include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "align/sheet/even.h"
+#include "align/sheet/sheet.h"
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
@@ -92,15 +93,6 @@ static int is_unsplit(const orb_align_shape *shapes, const orb_alignment *a) {
     }
   }
   return 1;
-}
-
-/* Moves the alignment of less energy to *one and frees the other. */
-static void keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other) {
-  int better = other->energy < one->energy;
-  orb_alignment_free(ctx, better ? one : other);
-  if (better) {
-    *one = *other;
-  }
 }
 
 /* Pins the shapes at the pairs of the matches, composes the map with them held and then without them. *held 0: the
@@ -223,7 +215,7 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
   }
   ORB_TRY(align_pairs(ctx, shapes, m, options, &other, &held));
   if (held) {
-    keep_better(ctx, alignment, &other);
+    orb_alignment_keep_better(ctx, alignment, &other);
   }
   return ORB_OK;
 }
@@ -390,17 +382,6 @@ end:
   return status;
 }
 
-/* Do rotations alone make the given spheres correspond? Then areas say more than angles. */
-static orb_status are_alike(orb_context *ctx, orb_alignment *a, orb_preset preset, int *alike) {
-  *alike = 1;
-  for (int32_t s = 1; s < a->shape_count && *alike; s++) {
-    double energy;
-    ORB_TRY(orb_compose_energy(ctx, &a->shapes[0], &a->shapes[s], preset, &energy));
-    *alike = energy <= ORB_FIND_ALIKE;
-  }
-  return ORB_OK;
-}
-
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *out) {
   orb_align_options rotated = *options;
@@ -409,7 +390,7 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   orb_status status = ORB_OK;
   int alike = 1;
   if (options->preset != ORB_PRESET_FAST) {
-    ORB_GO(status, are_alike(ctx, out, options->preset, &alike), end);
+    ORB_GO(status, orb_align_are_alike(ctx, out, options->preset, &alike), end);
     status = alike ? align_rotated(ctx, shapes, shape_count, 0, options, out)
                    : align_even(ctx, shapes, shape_count, &rotated, options, out);
   } else {

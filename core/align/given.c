@@ -11,7 +11,9 @@
 #include "align/pin/pin.h"
 #include "align/rbf/rbf.h"
 #include "align/rotate/rotate.h"
+#include "align/sheet/even.h"
 #include "align/sheet/landmarks.h"
+#include "align/sheet/sheet.h"
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
@@ -213,63 +215,12 @@ static orb_status spread_landmarks(orb_context *ctx, const double *positions, in
   return ORB_OK;
 }
 
-/* Moves landmarks to their partners, which the map as given takes them near: first `some`, which are far from each
- * other, then twice as many, and so on. Those in between have then moved with them, and their own ways are short. A
- * step that fails leaves the map as it was, and its landmarks to the next one. *energy: INFINITY if the last one fails.
- */
-static orb_status move_in_steps(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int32_t count,
-                                int32_t some, orb_preset preset, double *energy) {
-  const orb_map_guide near = {.from = ORB_MAP_FROM_NEAR};
-  for (int last = 0; !last; some *= 2) {
-    double energies[2];
-    int improved;
-    last = some >= count;
-    ORB_TRY(orb_compose(ctx, fixed, moving, 0, last ? count : some, &near, preset, energies, &improved));
-    *energy = improved ? energies[1] : INFINITY;
-  }
-  return ORB_OK;
-}
-
-/* Moves all landmarks to their partners at once, which mostly leads to a good map and is quick; where it folds the map,
- * a few at a time. *energy: INFINITY if neither leads to a map. */
-static orb_status move_near(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int32_t count,
-                            orb_preset preset, double *energy) {
-  const size_t size = 3 * (size_t)moving->mesh.vertex_count;
-  const orb_certificate given = moving->certificate;
-  orb_status status = ORB_E_NO_MEMORY;
-  double *before = ORB_NEW(ctx, double, size), *once = ORB_NEW(ctx, double, size), at_once = INFINITY;
-  if (!before || !once) {
-    goto end;
-  }
-  memcpy(before, moving->points, size * sizeof *before);
-  ORB_GO(status, move_in_steps(ctx, fixed, moving, count, count, preset, &at_once), end);
-  *energy = at_once;
-  if (count <= ORB_FIND_HINT_FEW || at_once <= orb_map_params_of(preset).energy.good) {
-    goto end;
-  }
-  const orb_certificate certified = moving->certificate;
-  memcpy(once, moving->points, size * sizeof *once);
-  memcpy(moving->points, before, size * sizeof *before);
-  moving->certificate = given;
-  ORB_GO(status, move_in_steps(ctx, fixed, moving, count, ORB_FIND_HINT_FEW, preset, energy), end);
-  if (at_once <= *energy) {
-    memcpy(moving->points, once, size * sizeof *once);
-    moving->certificate = certified;
-    *energy = at_once;
-  }
-end:
-  orb_free(ctx, before);
-  orb_free(ctx, once);
-  return status;
-}
-
-/* Composes the map to shape s towards a match that agrees with a few landmarks, without them, and then with all of them
- * pinned. *energy: INFINITY if there is no such match, or no such map. */
+/* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
+ * partners, with all of them pinned. *energy: INFINITY if there is no such match, or no such map. */
 static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double stretch,
-                                double *energy) {
+                                int keeps_angles, double *energy) {
   orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
   const int32_t count = a->landmark_count, few = count < ORB_FIND_HINT_FEW ? count : ORB_FIND_HINT_FEW;
-  int32_t *all[2] = {fixed->landmark_vertices, moving->landmark_vertices};
   int32_t *vertex[2] = {ORB_NEW(ctx, int32_t, count), ORB_NEW(ctx, int32_t, count)};
   orb_match match = {0};
   double energies[2];
@@ -279,19 +230,15 @@ static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, o
   if (status != ORB_OK) {
     goto done;
   }
-  memcpy(vertex[0], all[0], (size_t)count * sizeof *all[0]);
-  memcpy(vertex[1], all[1], (size_t)count * sizeof *all[1]);
+  memcpy(vertex[0], fixed->landmark_vertices, (size_t)count * sizeof *vertex[0]);
+  memcpy(vertex[1], moving->landmark_vertices, (size_t)count * sizeof *vertex[1]);
   ORB_GO(status, spread_landmarks(ctx, fixed->mesh.positions, count, vertex), done);
-  const orb_match_hint hint = {few, vertex[0], vertex[1], stretch};
+  const orb_match_hint hint = {count, few, vertex[0], vertex[1], stretch};
   ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match), done);
   if (match.is_found) {
-    const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE, .target = match.target};
-    ORB_GO(status, orb_compose(ctx, fixed, moving, 0, 0, &guide, preset, energies, &improved), done);
-    fixed->landmark_vertices = vertex[0];
-    moving->landmark_vertices = vertex[1];
-    status = move_near(ctx, fixed, moving, count, preset, energy);
-    fixed->landmark_vertices = all[0];
-    moving->landmark_vertices = all[1];
+    const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE, .target = match.target, .keeps_angles = keeps_angles};
+    ORB_GO(status, orb_compose(ctx, fixed, moving, 0, count, &guide, preset, energies, &improved), done);
+    *energy = improved ? energies[1] : INFINITY;
   }
 done:
   orb_match_free(ctx, &match);
@@ -300,8 +247,18 @@ done:
   return status;
 }
 
-/* Aligns shapes that are one body in several poses. The map without landmarks starts on the shapes' own embeddings,
- * which pins would distort: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
+orb_status orb_align_are_alike(orb_context *ctx, orb_alignment *a, orb_preset preset, int *alike) {
+  *alike = 1;
+  for (int32_t s = 1; s < a->shape_count && *alike; s++) {
+    double energy;
+    ORB_TRY(orb_compose_energy(ctx, &a->shapes[0], &a->shapes[s], preset, &energy));
+    *alike = energy <= ORB_FIND_ALIKE;
+  }
+  return ORB_OK;
+}
+
+/* Aligns shapes that are one body in several poses. The map starts on spheres that keep angles, as without landmarks.
+ * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
  * what lies between them. *found 0: the landmarks do not show one body, or no map was found, and `out` is empty. */
 static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                               const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
@@ -310,52 +267,74 @@ static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, i
   double sum = 0;
   rotated.method = ORB_ALIGN_ROTATE;
   *found = 0;
-  ORB_TRY(create(ctx, shapes, shape_count, landmarks, landmark_count, &rotated, out));
-  orb_status status = ORB_OK;
+  orb_even_shapes even = {0};
+  int alike;
+  orb_status status;
+  ORB_GO(status, create(ctx, shapes, shape_count, landmarks, landmark_count, &rotated, out), end);
+  ORB_GO(status, orb_align_are_alike(ctx, out, options->preset, &alike), end);
+  if (!alike) {
+    orb_alignment_free(ctx, out);
+    ORB_GO(status, orb_even_shapes_create(ctx, shapes, shape_count, &even), end);
+    ORB_GO(status, create(ctx, even.shapes, shape_count, landmarks, landmark_count, &rotated, out), end);
+  }
   for (int32_t s = 1; s < shape_count && sum < INFINITY && status == ORB_OK; s++) {
     double energy;
-    status = compose_posed(ctx, out, s, options->preset, stretch, &energy);
+    status = compose_posed(ctx, out, s, options->preset, stretch, !alike, &energy);
     sum += energy;
   }
   *found = status == ORB_OK && sum < INFINITY;
   out->energy = sum / (shape_count - 1);
+end:
   if (!*found) {
     orb_alignment_free(ctx, out);
   }
+  orb_even_shapes_free(ctx, &even);
   return status;
+}
+
+/* A landmark walk of a pinned alignment of two shapes. *walked 0: it led to no map, or to none that is better. */
+static orb_status improve_by_walk(orb_context *ctx, orb_preset preset, orb_alignment *a, int *walked) {
+  const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK};
+  double energies[2];
+  ORB_TRY(orb_compose(ctx, &a->shapes[0], &a->shapes[1], 1, a->landmark_count, &walk, preset, energies, walked));
+  a->energy = energies[1];
+  return ORB_OK;
 }
 
 /* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. Where its map is not good
  * and the shapes are in other poses, a match leads to a better one. All other starts are for shapes without either. */
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                           const orb_align_options *options, orb_alignment *a) {
-  const double good = orb_map_params_of(options->preset).energy.good;
-  const double poor = orb_map_params_of(options->preset).energy.poor;
-  double energy = INFINITY;
+  const orb_map_params params = orb_map_params_of(options->preset);
+  const double good = params.energy.good, poor = params.energy.poor;
+  orb_alignment other = {.energy = INFINITY};
   int walked = 0, posed = 0;
+  orb_status status = ORB_OK;
+  a->energy = INFINITY;
   if (a->shape_count == 2) {
-    const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK};
-    double energies[2];
-    ORB_TRY(orb_compose(ctx, &a->shapes[0], &a->shapes[1], 1, a->landmark_count, &walk, options->preset, energies,
-                        &walked));
-    a->energy = energy = energies[1];
+    ORB_TRY(improve_by_walk(ctx, options->preset, a, &walked));
   }
-  if (energy > good && a->landmark_count >= ORB_FIND_HINT_LEAST) {
-    orb_alignment other;
+  if (a->energy > good && a->landmark_count >= ORB_FIND_HINT_LEAST) {
     ORB_TRY(align_posed(ctx, shapes, a->shape_count, landmarks, a->landmark_count, options,
-                        energy > poor ? ORB_FIND_HINT_STRETCH_MOST : ORB_FIND_HINT_STRETCH, &other, &posed));
-    if (posed && other.energy < energy) {
-      orb_alignment_free(ctx, a);
-      *a = other;
-      energy = other.energy;
-    } else if (posed) {
-      orb_alignment_free(ctx, &other);
-    }
+                        a->energy > poor ? ORB_FIND_HINT_STRETCH_MOST : ORB_FIND_HINT_STRETCH, &other, &posed));
   }
-  if (options->preset == ORB_PRESET_QUALITY || (energy > good && !walked && !posed)) {
-    return orb_compose_all(ctx, a, ORB_MAP_FROM_SPACE, NULL, options->preset);
+  const int is_done = posed ? fmin(a->energy, other.energy) <= ORB_FIND_POSED_POOR : walked || a->energy <= good;
+  if (posed && is_done) {
+    orb_alignment_keep_better(ctx, a, &other);
+    posed = 0;
   }
-  return ORB_OK;
+  if (options->preset == ORB_PRESET_QUALITY || !is_done) {
+    ORB_GO(status, orb_compose_all(ctx, a, ORB_MAP_FROM_SPACE, NULL, options->preset), end);
+  }
+  if (posed) {
+    orb_alignment_keep_better(ctx, a, &other);
+    posed = 0;
+  }
+end:
+  if (posed) {
+    orb_alignment_free(ctx, &other);
+  }
+  return status;
 }
 
 /* Aligns by the method, then composes the maps. quick: first tries what leads to a good map soonest. */

@@ -62,4 +62,8 @@ ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape
 ORB_MUST_CHECK orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks,
                                          orb_preset preset, orb_alignment *alignment, int *lifted);
 
+/* Do rotations alone make the spheres of an alignment correspond? Then areas say more than angles, and the shapes keep
+ * their spheres. O(n). */
+ORB_MUST_CHECK orb_status orb_align_are_alike(orb_context *ctx, orb_alignment *a, orb_preset preset, int *alike);
+
 #endif

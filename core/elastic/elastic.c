@@ -43,12 +43,14 @@ static const double NORMAL_SHARE = 0.05; /* of normals beside positions in a fir
 static const double FACING = 0.2;        /* least cosine of two normals: with less the place does not pull */
 static const double HELD = 0.2;          /* weight with which such a vertex is held where it is, relative to a pull */
 static const double SLIDE = 0.1;         /* most that a place slides from a vertex within its tangent plane */
+static const double ANCHORED = 10;       /* pull of an anchor, relative to the edges of its vertex */
 static const double LEAST_DIAGONAL = 1e-9; /* keeps the matrix regular where nothing pulls */
 
 typedef struct registration {
   orb_context *ctx;
   orb_body a, b;
-  const orb_rough_map *map; /* NULL: none */
+  const orb_rough_map *map;           /* NULL: none */
+  const orb_elastic_anchors *anchors; /* NULL: none */
   orb_factor *factor;
   orb_elastic_pose *pose;
   double *normal; /* of a in its pose */
@@ -136,6 +138,22 @@ static void add_pull(registration *r, int32_t v, const double target[3], double 
   r->pull[v] += weight;
   for (int k = 0; k < 3; k++) {
     r->target[3 * (size_t)v + (size_t)k] += weight * target[k];
+  }
+}
+
+/* The point beside the vertex turns with its surroundings. */
+static void pull_by_anchors(registration *r) {
+  for (int32_t i = 0; r->anchors && i < r->anchors->count; i++) {
+    const orb_elastic_anchor *one = &r->anchors->one[i];
+    const double *rotation = r->pose->rotation + 9 * (size_t)one->vertex;
+    double target[3], edges = 0;
+    for (int k = 0; k < 3; k++) {
+      target[k] = one->place[k] - orb_dot(rotation + 3 * k, one->offset);
+    }
+    for (int32_t e = r->a.start[one->vertex]; e < r->a.start[one->vertex + 1]; e++) {
+      edges += r->a.weight[e];
+    }
+    add_pull(r, one->vertex, target, ANCHORED * edges);
   }
 }
 
@@ -264,6 +282,7 @@ static orb_status follow_map(registration *r) {
   for (int i = 0; i < MAP_ROUNDS; i++) {
     clear_pulls(r);
     pull_by_map(r, 1 / (MAP_REACH * MAP_REACH), i == 0 ? OUTLIER_FIRST : OUTLIER_MAP);
+    pull_by_anchors(r);
     ORB_TRY(solve(r, 1));
     fit_rotations(r);
   }
@@ -278,6 +297,7 @@ static orb_status follow_places(registration *r, int rounds, double first, doubl
       pull_by_map(r, MAP_SHARE / (MAP_REACH * MAP_REACH) * (1 - done / FADED), OUTLIER_PLACE);
     }
     pull_by_place(r, 1 / (reach * reach));
+    pull_by_anchors(r);
     for (int k = 0; k < TURNS; k++) {
       ORB_TRY(solve(r, k == 0));
       fit_rotations(r);
@@ -357,8 +377,8 @@ static orb_status registration_create(orb_context *ctx, const orb_mesh *a, const
 }
 
 orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, const orb_rough_map *map,
-                                orb_elastic_pose *pose, double *bend) {
-  registration r = {.ctx = ctx, .map = map, .pose = pose};
+                                const orb_elastic_anchors *anchors, orb_elastic_pose *pose, double *bend) {
+  registration r = {.ctx = ctx, .map = map, .anchors = anchors, .pose = pose};
   orb_status status;
   ORB_GO(status, registration_create(ctx, a, b, &r), end);
   ORB_GO(status, follow_map(&r), end);
@@ -369,8 +389,9 @@ end:
   return status;
 }
 
-orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_elastic_pose *pose) {
-  registration r = {.ctx = ctx, .pose = pose, .is_alone = 1};
+orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
+                              const orb_elastic_anchors *anchors, orb_elastic_pose *pose) {
+  registration r = {.ctx = ctx, .anchors = anchors, .pose = pose, .is_alone = 1};
   orb_status status;
   ORB_GO(status, registration_create(ctx, a, b, &r), end);
   status = follow_places(&r, SETTLE_ROUNDS, SETTLE_FIRST_REACH, SETTLE_LAST_REACH);

@@ -23,22 +23,38 @@ typedef struct orb_rough_map {
   const int32_t *back;  /* of the first mesh, for each vertex of the second */
 } orb_rough_map;
 
+/* A point of the first mesh that belongs at a place of the second one. */
+typedef struct orb_elastic_anchor {
+  int32_t vertex;   /* of the first mesh, near the point */
+  double offset[3]; /* from the vertex to the point, in the mesh as given */
+  double place[3];  /* where the point belongs */
+} orb_elastic_anchor;
+
+/* A pointer to them may be NULL: none. */
+typedef struct orb_elastic_anchors {
+  int32_t count;
+  const orb_elastic_anchor *one;
+} orb_elastic_anchors;
+
 /* Where the first mesh is. The caller owns both. */
 typedef struct orb_elastic_pose {
   double *position; /* 3 a vertex */
   double *rotation; /* 9 a vertex, row-major: of its surroundings, from the mesh as given */
 } orb_elastic_pose;
 
-/* Moves mesh a to mesh b along a rough map, then to the nearest places. Both meshes are scaled to the same area, near
- * 4π, and have no vertex without triangles. Fills the pose. *bend: mean squared change of the edges of a against the
- * rotations of their ends, relative to their squared lengths. O(n · m) a round, 14 rounds: about 0.05 s for two meshes
- * of a thousand vertices. One thread; may run beside others in loops of the context. */
+/* Moves mesh a to mesh b along a rough map, then to the nearest places, and its anchors, if any, to theirs. Both meshes
+ * are scaled to the same area, near 4π, and have no vertex without triangles. Fills the pose. *bend: mean squared
+ * change of the edges of a against the rotations of their ends, relative to their squared lengths. O(n · m) a round, 14
+ * rounds: about 0.05 s for two meshes of a thousand vertices. One thread; may run beside others in loops of the
+ * context. */
 ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                                               const orb_rough_map *map, orb_elastic_pose *pose, double *bend);
+                                               const orb_rough_map *map, const orb_elastic_anchors *anchors,
+                                               orb_elastic_pose *pose, double *bend);
 
-/* Moves mesh a to the nearest places of mesh b from a pose near them. Changes the pose. On all threads. */
+/* Moves mesh a to the nearest places of mesh b, and its anchors to theirs, from a pose near them. Changes the pose. On
+ * all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                                             orb_elastic_pose *pose);
+                                             const orb_elastic_anchors *anchors, orb_elastic_pose *pose);
 
 /* Carries a pose of a coarse mesh to points beside it: each point moves with the corners of its nearest triangle.
  * points: 3 each. out->rotation may be NULL. O(count log n), on all threads. */

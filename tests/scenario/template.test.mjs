@@ -43,16 +43,30 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 const normalOf = ([a, b, c]) => cross(minus(b, a), minus(c, a));
 const facesOf = ({ positions, triangles }) => triangles.map((t) => t.map((v) => positions[v]));
 
-/** The cosine between a triangle and the face of the surface that is nearest to its centre. */
-function facingOf(triangle, faces) {
-  const centre = [0, 1, 2].map((k) => triangle.reduce((sum, p) => sum + p[k] / 3, 0));
+/** The face of a surface that is nearest to a point. */
+function nearestFace(point, faces) {
   let [least, nearest] = [Infinity, null];
   for (const face of faces) {
-    const distance = toTriangle(centre, ...face);
+    const distance = toTriangle(point, ...face);
     if (distance < least) [least, nearest] = [distance, face];
   }
-  const [a, b] = [normalOf(triangle), normalOf(nearest)];
-  return a.reduce((sum, x, k) => sum + x * b[k], 0) / (Math.hypot(...a) * Math.hypot(...b));
+  return nearest;
+}
+
+/**
+ * The cosine between a triangle and the surface at its corners, which lie on it. The centre may be far from the surface,
+ * and nearest to a part of it on which the triangle does not lie.
+ */
+function facingOf(triangle, faces) {
+  const sum = [0, 0, 0];
+  for (const corner of triangle) {
+    const normal = normalOf(nearestFace(corner, faces));
+    normal.forEach((x, k) => {
+      sum[k] += x / Math.hypot(...normal);
+    });
+  }
+  const normal = normalOf(triangle);
+  return normal.reduce((total, x, k) => total + x * sum[k], 0) / (Math.hypot(...normal) * Math.hypot(...sum));
 }
 
 /** That the inverted triangles of a pair are counted, and the largest named by their numbers in the file. Returns how many. */
@@ -63,9 +77,9 @@ function assertNamed({ a, b, inverted_fraction, inverted_count, inverted_triangl
   const places = [a, b].map((s) => pointsOf(morph, s));
   const faces = [a, b].map((s) => facesOf(sources[s]));
   const shown = inverted_triangles.map((t) => places.map((points) => sources[0].triangles[t].map((v) => points[v])));
-  // The others face their surface with a cosine near 1. Where it is bent, the nearest face may not be the map's.
+  // The others face their surface with a cosine near 1. At an edge, the face beside a corner may be the other one.
   const facing = shown.map((pair) => Math.min(...pair.map((triangle, i) => facingOf(triangle, faces[i]))));
-  assert.ok(Math.max(-1, ...facing) < 0.5, `${facing}`);
+  assert.ok(Math.max(-1, ...facing) < 0.25, `${facing}`);
   assert.ok(facing.filter((x) => x < 0).length >= 0.8 * facing.length, `${facing}`);
   const sizes = shown.map((pair) => Math.max(...pair.map((triangle) => Math.hypot(...normalOf(triangle)))));
   assert.ok(
@@ -233,7 +247,11 @@ test('where the template is too coarse for a shape, its triangles are named, the
   }
   const limit = tolerance * diagonal;
   const expected = errors.filter((x) => x > limit).sort((a, b) => b - a);
-  assert.ok(expected.length > 0 && expected.length < 20, `only the horn is missed: ${expected.length}`);
+  assert.ok(expected.length > 0);
+  // The horn stands on the x axis; its bump falls below a thousandth of the radius 0.36 away from there.
+  const axis = ([x, y, z]) => Math.hypot(x / Math.hypot(x, y, z) - 1, y / Math.hypot(x, y, z), z / Math.hypot(x, y, z));
+  for (const [i, face] of faces.entries())
+    if (errors[i] > limit) assert.ok(Math.min(...face.map(axis)) < 0.36, `triangle ${i} is not at the horn`);
   assert.equal(coarse.count, expected.length);
   assert.equal(coarse.triangles.length, coarse.count);
   coarse.errors_relative.forEach((x, i) => assert.ok(Math.abs(x * diagonal - expected[i]) < 1e-5, `error ${i}`));

@@ -11,6 +11,7 @@
 #include "align/find/match.h"
 #include "elastic/elastic.h"
 #include "elastic/searched.h"
+#include "numeric/vec3.h"
 #include "support_context.h"
 #include "support_shapes.h"
 
@@ -91,7 +92,7 @@ static void a_rotation_is_found(void **state) {
   int32_t *next = neighbours(&a);
   orb_rough_map map = {next, next};
   orb_elastic_pose pose = pose_of(&a);
-  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, &pose, &bend), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, NULL, &pose, &bend), ORB_OK);
   assert_true(bend >= 0 && bend < 0.02);
   for (int32_t v = 0; v < a.vertex_count; v++) {
     worst = fmax(worst, distance(pose.position + 3 * (size_t)v, b.positions + 3 * (size_t)v));
@@ -125,7 +126,7 @@ static void a_bent_tube_is_found(void **state) {
   int32_t *next = neighbours(&a);
   orb_rough_map map = {next, next};
   orb_elastic_pose pose = pose_of(&a);
-  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, &pose, &bend), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, NULL, &pose, &bend), ORB_OK);
   for (int32_t v = 0; v < a.vertex_count; v++) {
     sum += distance(pose.position + 3 * (size_t)v, b.positions + 3 * (size_t)v) / a.vertex_count;
   }
@@ -133,6 +134,51 @@ static void a_bent_tube_is_found(void **state) {
   assert_true(bend < 0.1);
   pose_free(&pose);
   orb_free(ctx, next);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+}
+
+/* Where an anchor's point is: it turns with the surroundings of its vertex. */
+static double away_from_place(const orb_elastic_pose *pose, const orb_elastic_anchor *one) {
+  double at[3];
+  for (int k = 0; k < 3; k++) {
+    at[k] = pose->position[3 * (size_t)one->vertex + (size_t)k] +
+            orb_dot(pose->rotation + 9 * (size_t)one->vertex + 3 * (size_t)k, one->offset);
+  }
+  return distance(at, one->place);
+}
+
+/* A ball lies on itself however it is rotated, so nothing but anchors tells where its points belong. */
+static void anchors_reach_their_places(void **state) {
+  (void)state;
+  enum { ANCHORS = 14 };
+  orb_mesh a = shape_ball(ctx, 3), b = shape_ball(ctx, 3);
+  const double c = cos(0.3), s = sin(0.3);
+  orb_elastic_anchor anchor[ANCHORS] = {0};
+  const orb_elastic_anchors anchors = {ANCHORS, anchor};
+  scale_to_sphere(&a);
+  scale_to_sphere(&b);
+  assert_true(a.vertex_count > 10 * ANCHORS);
+  for (int32_t i = 0; i < ANCHORS; i++) {
+    anchor[i].vertex = i * (a.vertex_count / ANCHORS);
+    const double *p = a.positions + 3 * (size_t)anchor[i].vertex, q[3] = {p[0] - 0.05 * p[1], p[1] + 0.05 * p[0], p[2]};
+    orb_sub(q, p, anchor[i].offset);
+    memcpy(anchor[i].place, (double[3]){c * q[0] - s * q[1], s * q[0] + c * q[1], q[2]}, sizeof anchor[i].place);
+  }
+  for (int with = 0; with < 2; with++) {
+    double away = 0;
+    orb_elastic_pose pose = pose_of(&a);
+    memcpy(pose.position, a.positions, 3 * (size_t)a.vertex_count * sizeof *pose.position);
+    for (int32_t i = 0; i < 9 * a.vertex_count; i++) {
+      pose.rotation[i] = i % 9 % 4 == 0;
+    }
+    assert_int_equal(orb_elastic_settle(ctx, &a, &b, with ? &anchors : NULL, &pose), ORB_OK);
+    for (int32_t i = 0; i < ANCHORS; i++) {
+      away += away_from_place(&pose, &anchor[i]) / ANCHORS;
+    }
+    assert_true(with ? away < 0.05 : away > 0.2); /* a rotation by 0.3 moves a point by 0.24 in the mean */
+    pose_free(&pose);
+  }
   shape_free(ctx, &a);
   shape_free(ctx, &b);
 }
@@ -158,8 +204,8 @@ static void wrong_limbs_bend(void **state) {
   }
   orb_rough_map identity = {same, same}, turned = {forth, back};
   orb_elastic_pose pose = pose_of(&a);
-  assert_int_equal(orb_elastic_register(ctx, &a, &a, &identity, &pose, &right), ORB_OK);
-  assert_int_equal(orb_elastic_register(ctx, &a, &a, &turned, &pose, &wrong), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &a, &identity, NULL, &pose, &right), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &a, &turned, NULL, &pose, &wrong), ORB_OK);
   assert_true(right < 0.01);
   assert_true(wrong > 0.1);
   pose_free(&pose);
@@ -287,12 +333,10 @@ static void the_nearest_vertex_is_found(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(a_rotation_is_found),
-                                     cmocka_unit_test(a_bent_tube_is_found),
-                                     cmocka_unit_test(wrong_limbs_bend),
-                                     cmocka_unit_test(a_copy_is_matched),
-                                     cmocka_unit_test(threads_change_nothing),
-                                     cmocka_unit_test(the_nearest_vertex_is_found),
-                                     cmocka_unit_test(few_vertices_are_matched_by_rotations)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_rotation_is_found),         cmocka_unit_test(a_bent_tube_is_found),
+      cmocka_unit_test(anchors_reach_their_places),  cmocka_unit_test(wrong_limbs_bend),
+      cmocka_unit_test(a_copy_is_matched),           cmocka_unit_test(threads_change_nothing),
+      cmocka_unit_test(the_nearest_vertex_is_found), cmocka_unit_test(few_vertices_are_matched_by_rotations)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

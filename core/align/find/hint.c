@@ -21,9 +21,9 @@ static int32_t nearest_vertex(const orb_mesh *mesh, const double at[3]) {
   return nearest;
 }
 
-orb_status orb_hint_places_create(orb_context *ctx, int32_t count, double *at[2], const orb_coarse_copy copy[2],
-                                  orb_hint_places *out) {
-  *out = (orb_hint_places){.count = count, .at = {at[0], at[1]}};
+orb_status orb_hint_places_create(orb_context *ctx, int32_t count, int32_t few, double *at[2],
+                                  const orb_coarse_copy copy[2], orb_hint_places *out) {
+  *out = (orb_hint_places){.count = count, .few = few, .at = {at[0], at[1]}};
   for (int s = 0; s < 2; s++) {
     out->vertex[s] = ORB_NEW(ctx, int32_t, count);
     if (!out->vertex[s] || !out->at[s]) {
@@ -44,6 +44,22 @@ void orb_hint_places_free(orb_context *ctx, orb_hint_places *places) {
   memset(places, 0, sizeof *places);
 }
 
+orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *places, const orb_mesh *copy,
+                                   orb_elastic_anchor **out) {
+  *out = ORB_NEW(ctx, orb_elastic_anchor, places->count);
+  if (!*out) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < places->count; i++) {
+    orb_elastic_anchor *one = *out + i;
+    const double *at = places->at[1] + 3 * (size_t)i;
+    one->vertex = nearest_vertex(copy, at);
+    orb_sub(at, copy->positions + 3 * (size_t)one->vertex, one->offset);
+    memcpy(one->place, places->at[0] + 3 * (size_t)i, sizeof one->place);
+  }
+  return ORB_OK;
+}
+
 /* Distances along copy s between the first `sources` landmarks and all: sources × count. */
 static orb_status measure(orb_context *ctx, const orb_hint_places *places, const orb_mesh *mesh, int s, int32_t sources,
                           double *out) {
@@ -52,8 +68,8 @@ static orb_status measure(orb_context *ctx, const orb_hint_places *places, const
   orb_status status = from ? orb_distances_create(ctx, mesh, &distances) : ORB_E_NO_MEMORY;
   for (int32_t i = 0; i < sources && status == ORB_OK; i++) {
     orb_distances_from(&distances, places->vertex[s][i], from);
-    for (int32_t k = 0; k < places->count; k++) {
-      out[(size_t)i * (size_t)places->count + (size_t)k] = from[places->vertex[s][k]];
+    for (int32_t k = 0; k < places->few; k++) {
+      out[(size_t)i * (size_t)places->few + (size_t)k] = from[places->vertex[s][k]];
     }
     status = orb_context_check(ctx);
   }
@@ -64,7 +80,7 @@ static orb_status measure(orb_context *ctx, const orb_hint_places *places, const
 
 orb_status orb_hint_stretch(orb_context *ctx, const orb_hint_places *places, const orb_coarse_copy copy[2],
                             double *stretch) {
-  const int32_t count = places->count, sources = count < ORB_FIND_HINT_SOURCES ? count : ORB_FIND_HINT_SOURCES;
+  const int32_t count = places->few, sources = count < ORB_FIND_HINT_SOURCES ? count : ORB_FIND_HINT_SOURCES;
   const size_t pairs = (size_t)sources * (size_t)count;
   double *along[2] = {ORB_NEW(ctx, double, pairs), ORB_NEW(ctx, double, pairs)}, sum = 0;
   int32_t used = 0;
@@ -86,11 +102,11 @@ orb_status orb_hint_stretch(orb_context *ctx, const orb_hint_places *places, con
 
 double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *first, const double *pose) {
   double sum = 0;
-  for (int32_t i = 0; i < places->count; i++) {
+  for (int32_t i = 0; i < places->few; i++) {
     const size_t v = 3 * (size_t)places->vertex[0][i];
     double beside = sqrt(orb_distance2(first->mesh.positions + v, places->at[0] + 3 * (size_t)i));
     double away = sqrt(orb_distance2(pose + v, places->at[1] + 3 * (size_t)i));
     sum += fmax(0, away - beside); /* a landmark lies beside the vertex that stands for it */
   }
-  return places->count > 0 ? sum / places->count : 0;
+  return places->few > 0 ? sum / places->few : 0;
 }

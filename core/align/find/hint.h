@@ -4,26 +4,32 @@
 #define ORB_ALIGN_FIND_HINT_H
 
 #include "align/sheet/copy.h"
+#include "elastic/elastic.h"
 
 /* Vertices of the two given meshes that correspond. */
 typedef struct orb_match_hint {
-  int32_t count;
+  int32_t count, few; /* the first `few` of them exclude maps; all of them draw the best map to their partners */
   const int32_t *first, *second;
   double stretch; /* orb_hint_stretch() up to which the shapes are one in two poses */
 } orb_match_hint;
 
 /* The hint on scaled coarse copies of the shapes. */
 typedef struct orb_hint_places {
-  int32_t count;
+  int32_t count, few;
   int32_t *vertex[2]; /* the nearest vertex of the copy */
   double *at[2];      /* the landmark, in the copy's space */
 } orb_hint_places;
 
 /* Finds the places. at[2]: where the landmarks lie in the copies' spaces, 3 each; `out` takes both over, also if it
- * fails. Free `out` in any case. O(count · n). */
-ORB_MUST_CHECK orb_status orb_hint_places_create(orb_context *ctx, int32_t count, double *at[2],
+ * fails. few: as of the hint. Free `out` in any case. O(count · n). */
+ORB_MUST_CHECK orb_status orb_hint_places_create(orb_context *ctx, int32_t count, int32_t few, double *at[2],
                                                  const orb_coarse_copy copy[2], orb_hint_places *out);
 void orb_hint_places_free(orb_context *ctx, orb_hint_places *places);
+
+/* The landmarks as anchors of a copy of the second shape, of any size, on the first one. The caller frees them. O(count
+ * · n). */
+ORB_MUST_CHECK orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *places, const orb_mesh *copy,
+                                                  orb_elastic_anchor **out);
 
 /* The mean of |ln(d/d')| over pairs of landmarks that are far apart, where d and d' are their distances along the two
  * surfaces, of equal areas: 0 for one shape in two poses. INFINITY if no two are far apart. O(n log n). */

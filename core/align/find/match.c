@@ -150,8 +150,8 @@ static void register_tasks(void *arg, int64_t begin, int64_t end, int thread) {
   for (int64_t i = begin; i < end; i++) {
     trial *one = &t->trial[t->task[i] / 2];
     int s = t->task[i] % 2;
-    t->status[i] = orb_elastic_register(t->ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &one->map[s], &one->pose[s],
-                                        &one->bend[s]);
+    t->status[i] = orb_elastic_register(t->ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &one->map[s], NULL,
+                                        &one->pose[s], &one->bend[s]);
   }
 }
 
@@ -344,6 +344,24 @@ static orb_status write_ranking(const search *t, orb_match *out) {
   return write_pairs(t, best, &out->pairs);
 }
 
+/* Registers a trial's second copy again with the landmarks as anchors. They only excluded maps until here, since they
+ * would draw a wrong one to their partners as well. */
+static orb_status draw_to_landmarks(const search *t, const trial *one) {
+  orb_elastic_anchor *anchors = NULL;
+  orb_elastic_pose pose = one->pose[1];
+  double bend;
+  orb_status status;
+  if (t->hint.count == 0) {
+    return ORB_OK;
+  }
+  ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, &t->copy[1].mesh, &anchors), end);
+  const orb_elastic_anchors held = {t->hint.count, anchors};
+  status = orb_elastic_register(t->ctx, &t->copy[1].mesh, &t->copy[0].mesh, &one->map[1], &held, &pose, &bend);
+end:
+  orb_free(t->ctx, anchors);
+  return status;
+}
+
 static void pose_free(orb_context *ctx, orb_elastic_pose *pose) {
   orb_free(ctx, pose->position);
   orb_free(ctx, pose->rotation);
@@ -353,6 +371,7 @@ static void pose_free(orb_context *ctx, orb_elastic_pose *pose) {
 static orb_status write_targets(const search *t, const trial *one, double **target) {
   orb_coarse_copy fine[2] = {{{0}, NULL, NULL}, {{0}, NULL, NULL}};
   orb_elastic_pose pose = {NULL, NULL}, all = {NULL, NULL};
+  orb_elastic_anchor *anchors = NULL;
   size_t count = 3 * (size_t)t->mesh[1]->vertex_count;
   double *points = ORB_NEW(t->ctx, double, count);
   orb_status status = ORB_E_NO_MEMORY;
@@ -370,9 +389,12 @@ static orb_status write_targets(const search *t, const trial *one, double **targ
     status = ORB_E_NO_MEMORY;
     goto end;
   }
+  ORB_GO(status, draw_to_landmarks(t, one), end);
   ORB_GO(status, orb_elastic_carry(t->ctx, &t->copy[1].mesh, &one->pose[1], fine[1].mesh.positions, (int32_t)n, &pose),
          end);
-  ORB_GO(status, orb_elastic_settle(t->ctx, &fine[1].mesh, &fine[0].mesh, &pose), end);
+  ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, &fine[1].mesh, &anchors), end);
+  const orb_elastic_anchors held = {t->hint.count, anchors};
+  ORB_GO(status, orb_elastic_settle(t->ctx, &fine[1].mesh, &fine[0].mesh, &held, &pose), end);
   for (size_t i = 0; i < count; i++) {
     points[i] = (t->mesh[1]->positions[i] - t->scaling[1].middle[i % 3]) * t->scaling[1].scale;
   }
@@ -382,6 +404,7 @@ static orb_status write_targets(const search *t, const trial *one, double **targ
   }
 end:
   orb_free(t->ctx, points);
+  orb_free(t->ctx, anchors);
   pose_free(t->ctx, &pose);
   for (int s = 0; s < 2; s++) {
     orb_coarse_copy_free(t->ctx, &fine[s]);
@@ -392,7 +415,7 @@ end:
 /* Places the landmarks on the copies. *agrees 0: they say that the shapes are not one in two poses. */
 static orb_status take_hint(search *t, const orb_match_hint *hint, int *agrees) {
   double *at[2], stretch;
-  int32_t count = 0;
+  int32_t count = 0, few = 0;
   for (int s = 0; s < 2; s++) {
     at[s] = ORB_NEW(t->ctx, double, 3 * (size_t)hint->count);
   }
@@ -407,8 +430,9 @@ static orb_status take_hint(search *t, const orb_match_hint *hint, int *agrees) 
       at[s][3 * (size_t)count + (size_t)(k % 3)] = (x - t->scaling[s].middle[k % 3]) * t->scaling[s].scale;
     }
     count++;
+    few += i < hint->few;
   }
-  ORB_TRY(orb_hint_places_create(t->ctx, count, at, t->copy, &t->hint));
+  ORB_TRY(orb_hint_places_create(t->ctx, count, few, at, t->copy, &t->hint));
   ORB_TRY(orb_hint_stretch(t->ctx, &t->hint, t->copy, &stretch));
   *agrees = stretch <= hint->stretch;
   return ORB_OK;

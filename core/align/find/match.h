@@ -1,5 +1,5 @@
 /* Which points of two shapes correspond, by rough maps, ranked by how much they bend the shapes. Landmarks, where there
- * are any, only exclude maps.
+ * are any, exclude maps, and draw the best of the others to their partners.
  *
  * Comes in: two meshes. Goes out: where each vertex of the second lies on the first. Read in this order:
  *
@@ -55,8 +55,9 @@ typedef struct orb_match {
 } orb_match;
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
- * poses, and only maps count that take them near their partners. Free `out` in any case. About 1 s of one thread,
- * whatever the size; trials run on all threads, and the result has the same bytes for any number of them. */
+ * poses, and only maps count that take the first few near their partners; the targets then take all of them there. Free
+ * `out` in any case. About 1 s of one thread, whatever the size; trials run on all threads, and the result has the same
+ * bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
 /* The target of other[k], which the caller frees: NULL on failure. The meshes of the match must still be there. About

@@ -61,9 +61,9 @@ static const double ORB_FIND_DIFFERENT = 0.15;
 /* Matches that must agree with landmarks (hint.c). */
 
 enum {
-  ORB_FIND_HINT_LEAST = 4, /* landmarks; fewer do not tell a pose from other proportions */
-  ORB_FIND_HINT_FEW = 8, /* landmarks that a match must agree with, and that are moved to their partners first: as many
-                            as a body has tips. With 4 or 24 at first, a third of the pairs folded */
+  ORB_FIND_HINT_LEAST = 4,  /* landmarks; fewer do not tell a pose from other proportions */
+  ORB_FIND_HINT_FEW = 8,    /* landmarks that a match must agree with: as many
+                               as a body has tips. With 4 or 24 at first, a third of the pairs folded */
   ORB_FIND_HINT_SOURCES = 6 /* landmarks from which distances are measured; each takes 1 ms */
 };
 /* Distances shorter than this are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.
@@ -76,6 +76,10 @@ static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0
 /* A rough map that takes landmarks farther from their partners than this, in the mean, is another one. In radii of a
  * ball of the shape's area. */
 static const double ORB_FIND_HINT_OFF = 0.5;
+
+/* The energy of the map that such a match leads to, above which all other starts are tried as well: shrec397 to
+ * shrec393 had 3.1 from noisy targets, and 1.4 from other starts; right maps of people have at most 1.5. */
+static const double ORB_FIND_POSED_POOR = 1.8;
 
 /* Found landmarks (found.c). */
 

@@ -10,8 +10,8 @@
  * unless a start is nearly a map with them and a better map without them.
  *
  * With landmarks, the caller asks for the quick way first (walked.c): a landmark walk, optimised on a coarse level and
- * refined. For shapes in other poses, it then asks for a map without the landmarks, and for the same map with them
- * (starts/shift.c). Where neither gives a map, there are three kinds of starts:
+ * refined. For shapes in other poses, it then gives spatial targets that take the landmarks near their partners
+ * (targets.c). Where neither gives a map, there are three kinds of starts:
  * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c), which
  *   samples by eigenfunctions guide where they agree with the landmarks (starts/spectral_samples.c). This is good where
  *   it folds little. Flips are allowed against a growing barrier until untangling clears nearly all; collapses clear
@@ -45,7 +45,6 @@
 #include "align/map/start.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
-#include "align/map/starts/shift.h"
 #include "align/map/starts/spectral_samples.h"
 #include "align/map/swap.h"
 #include "align/map/targets.h"
@@ -266,22 +265,6 @@ static orb_status let_go(orb_map_run *c) {
   return orb_map_run_start(c, ORB_MAP_GIVEN);
 }
 
-static orb_status snap(orb_map_run *c) {
-  const int left = 1 + (int)fmin(c->params.shift.most - 1, orb_map_longest_way(c) / c->params.shift.step);
-  c->pairs.count = c->pairs.landmarks;
-  ORB_TRY(orb_map_levels_prepare(c));
-  for (int i = left; i > 0; i--) {
-    ORB_TRY(orb_map_shift(c, 1.0 / i));
-    c->best_energy = INFINITY;
-    c->params.work.rough = i > 1;
-    ORB_TRY(orb_map_run_start(c, ORB_MAP_GIVEN));
-    if (c->best_energy == INFINITY) {
-      return ORB_OK;
-    }
-  }
-  return c->best_energy > c->params.energy.good ? orb_map_run_passes(c, 1) : ORB_OK;
-}
-
 /* Writes the best map back if it is better than the alignment as given and certified. */
 static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double energy[2], int *improved) {
   orb_aligned_shape *shapes[2] = {c->moving, fixed};
@@ -360,10 +343,11 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, orb_map_pairs_create(&c), done);
-  if (guide->from == ORB_MAP_FROM_NEAR) {
-    energy[0] = INFINITY; /* the landmarks are apart */
-    ORB_GO(status, snap(&c), done);
-  } else if (guide->from == ORB_MAP_FROM_PINS) {
+  if (guide->target && c.pairs.landmarks > 0) {
+    energy[0] = energy[1] = c.best_energy = INFINITY; /* the landmarks are apart */
+    c.pairs.count = c.pairs.landmarks;                /* mirror landmarks would hold what the targets know better */
+  }
+  if (guide->from == ORB_MAP_FROM_PINS) {
     ORB_GO(status, let_go(&c), done);
   } else if (guide->from == ORB_MAP_FROM_COPY) {
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);

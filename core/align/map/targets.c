@@ -1,10 +1,10 @@
-/* A start from the targets is nearly always a map: unfolding (engine/unfold.h) clears what flips are left. Where the
- * targets were folded it has crumpled, in fingers and in the pockets of a face, and how much is close to chance. So it
- * is ironed (engine/iron.h) and drawn to the targets at once, which smooths most of it. Where that leads to no map of
- * shapes that correspond, passes through samples of the best map follow, and then two more starts, until one is such a
- * map: from the targets on a coarser level, and from a registration in space through samples of them. Then passes and a
- * draw bring the energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no
- * pass helps, the map is drawn to the given targets.
+/* The targets are smoothed first, by a registration in space through samples of them. A start from them is nearly
+ * always a map, landmarks held: unfolding (engine/unfold.h) clears what flips are left. Where the targets are folded it
+ * has crumpled, in the pockets of a face and where limbs touch. So it is ironed (engine/iron.h) and drawn to the
+ * targets at once, which smooths most of it. Where that leads to no map of shapes that correspond, passes through
+ * samples of the best map follow, and then two more starts, until one is such a map: from the targets as given, on a
+ * coarser level and on the usual one. Then passes and a draw bring the energy down. Passes come first: they find a
+ * better basin, and a draw only the bottom of one. Where no pass helps, the map is drawn to the given targets.
  *
  * Where that gives no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
  * and is optimised on a coarse level, so several are tried, and the best one is refined. Where the caller says so, a
@@ -31,12 +31,34 @@ static double good_energy(const orb_map_run *c) {
   return c->keeps_angles ? c->params.energy.good : c->params.targets.alike;
 }
 
-static orb_status start_through_samples(orb_map_run *c) {
-  allow(c);
+/* Up to which a map from a start is not improved: landmarks hold crumples that others lose, and a map with them is then
+ * worth more time. */
+static double smooth_energy(const orb_map_run *c) {
+  return c->pairs.landmarks > 0 ? c->params.targets.alike : good_energy(c);
+}
+
+/* Spatial targets from a registration through samples of the given ones. These come from decimated copies, and are
+ * noisy where the shapes are finer, as in fingers: a start from them crumples there, and how much is close to chance.
+ */
+static orb_status smooth_targets(orb_map_run *c) {
   c->samples_follow_target = 1;
   orb_status status = orb_map_register(c, c->params.registration.samples);
   c->samples_follow_target = 0;
-  return status == ORB_OK ? orb_map_run_start(c, ORB_MAP_SPATIAL) : status;
+  return status;
+}
+
+/* The targets of the first start. Walks take samples of the targets themselves. */
+static orb_status register_first(orb_map_run *c) {
+  return c->walks_first ? orb_map_register(c, 0) : smooth_targets(c);
+}
+
+/* From the targets that the first start has not followed: the smooth ones, or those as given, which are registered. */
+static orb_status start_from_others(orb_map_run *c) {
+  allow(c);
+  if (c->walks_first) {
+    ORB_TRY(smooth_targets(c));
+  }
+  return orb_map_run_start(c, ORB_MAP_SPATIAL);
 }
 
 /* From the targets on a coarser level. */
@@ -78,7 +100,7 @@ static orb_status run_passes(orb_map_run *c) {
 /* The first start. *walked: it is a walk. */
 static orb_status run_first(orb_map_run *c, int *walked) {
   const double given = c->best_energy;
-  ORB_TRY(orb_map_register(c, 0));
+  ORB_TRY(register_first(c));
   ORB_TRY(orb_map_levels_prepare(c));
   if (c->walks_first) {
     ORB_TRY(start_guided(c));
@@ -100,7 +122,7 @@ static orb_status run_first(orb_map_run *c, int *walked) {
 /* What leads on from the first start, until there is a map of shapes that correspond. */
 static orb_status run_starts(orb_map_run *c) {
   const orb_map_params *p = &c->params;
-  if (c->best_energy > good_energy(c) && c->best_energy <= p->targets.crumpled) {
+  if (c->best_energy > smooth_energy(c) && c->best_energy <= p->targets.crumpled) {
     ORB_TRY(draw(c));
   }
   if (c->best_energy > p->energy.poor) {
@@ -110,7 +132,7 @@ static orb_status run_starts(orb_map_run *c) {
   if (c->best_energy > p->energy.poor) {
     ORB_TRY(start_coarser(c));
   }
-  return c->best_energy > p->energy.poor ? start_through_samples(c) : ORB_OK;
+  return c->best_energy > p->energy.poor ? start_from_others(c) : ORB_OK;
 }
 
 /* A walk has few crumples, which draws would smooth. */
@@ -131,11 +153,11 @@ static orb_status walk_last(orb_map_run *c, int *walked) {
 static orb_status improve_started(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   const double started = c->best_energy;
-  if (started <= good_energy(c) || started > p->targets.hopeless) {
+  if (started <= smooth_energy(c) || started > p->targets.hopeless) {
     return ORB_OK;
   }
   ORB_TRY(run_passes(c));
-  if (c->best_energy <= good_energy(c) || c->best_energy > p->targets.drawn) {
+  if (c->best_energy <= smooth_energy(c) || c->best_energy > p->targets.drawn) {
     return ORB_OK;
   }
   if (!(c->best_energy < started)) {

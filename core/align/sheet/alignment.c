@@ -19,3 +19,12 @@ void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   orb_free(ctx, alignment->suspects);
   memset(alignment, 0, sizeof *alignment);
 }
+
+void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other) {
+  const int better = other->energy < one->energy;
+  orb_alignment_free(ctx, better ? one : other);
+  if (better) {
+    *one = *other;
+  }
+  memset(other, 0, sizeof *other);
+}

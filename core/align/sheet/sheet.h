@@ -71,4 +71,7 @@ static inline int32_t orb_sheet_swing(const orb_sheet *sheet, int32_t h) {
 /* The half-edge from vertex a to vertex b, −1 if they are not neighbours. O(valence). */
 int32_t orb_sheet_edge(const orb_sheet *sheet, int32_t a, int32_t b);
 
+/* Moves the alignment of less energy to *one, and frees the other. *other is empty then. */
+void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other);
+
 #endif

@@ -11,7 +11,6 @@ typedef enum orb_map_from {
   ORB_MAP_FROM_SPACE, /* what fits best in space */
   ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
   ORB_MAP_FROM_WALK,  /* none: a landmark walk alone, which is quick. Needs `both` */
-  ORB_MAP_FROM_NEAR,  /* none: the map as given takes the landmarks near their partners, and they are moved there */
   ORB_MAP_FROM_PINS,  /* none: the map as given is only let go where it was pinned. For springs */
   ORB_MAP_FROM_COPY   /* none: a decimated copy of the moving shape has its map already. The map as given is not used */
 } orb_map_from;

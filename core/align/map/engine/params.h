@@ -216,14 +216,6 @@ typedef struct orb_map_params {
     double fall;   /* its factor from round to round */
   } draw;
 
-  /* Landmarks that a map without them takes near their partners, and that are shifted there. */
-  struct {
-    double reach; /* a landmark takes along what lies nearer than this many times its way, */
-    double least; /* or than this */
-    double step;  /* of the longest way: the map is optimised after each, */
-    int most;     /* but after no more than this many */
-  } shift;
-
   /* A start that is nearly a map. */
   struct {
     int32_t few;      /* at most one flip in so many triangles: the start is nearly a map */

@@ -9,7 +9,6 @@
  *   smooth.h         where noisy places are a map
  *   place.h          their places on the fixed shape, and the vertices of a level at them
  *   landmark_walk.h  a map in which all pairs meet
- *   shift.h          landmarks of a map moved to their partners nearby
  */
 #ifndef ORB_ALIGN_MAP_STARTS_PLACE_H
 #define ORB_ALIGN_MAP_STARTS_PLACE_H
