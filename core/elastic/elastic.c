@@ -5,7 +5,12 @@
  *
  * The first rotations come from the rough map: how it rotates the surroundings of each vertex. If they came from the
  * rotation of the whole instead, an arm raised by 150° would stay twisted, since neighbouring rotations hold each
- * other. */
+ * other.
+ *
+ * A slide differs in two things. An edge should be what rotations and smoothed stretches make of it (stretch.h): bodies
+ * that differ in girth otherwise slide along each other until their lengths agree. And it looks for places ahead of
+ * where the mesh is, on the way that it took in the last round (momentum; Polyak 1964): a vertex is pulled to where it
+ * is already but for its distance from the surface, and so moves along the surface by little in each round. */
 #include "elastic/elastic.h"
 
 #include <math.h>
@@ -16,6 +21,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "elastic/body.h"
+#include "elastic/stretch.h"
 #include "numeric/factor.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
@@ -26,6 +32,7 @@ enum {
   MAP_ROUNDS = 4,    /* along the rough map alone; more change little */
   PLACE_ROUNDS = 10, /* to the nearest places; 30 rank maps no better */
   SETTLE_ROUNDS = 6, /* of a pose that is near already */
+  SLIDE_ROUNDS = 10, /* 15 come nearer to the truth by a fiftieth */
   TURNS = 2,         /* of rotations and positions in a round */
   SURROUNDINGS = 60, /* vertices whose images give a first rotation: a limb's girth and as much of its length */
   GRAIN = 128        /* vertices of one task */
@@ -33,6 +40,9 @@ enum {
 /* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
 static const double MAP_REACH = 0.6, FIRST_REACH = 0.6, LAST_REACH = 0.06;
 static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
+/* More lets people slide nearer to the truth, and animals of other proportions away from it. */
+static const double SLIDE_FIRST_REACH = 0.3, SLIDE_LAST_REACH = 0.06;
+static const double AHEAD = 0.8; /* of the way of the last round: how far ahead a slide looks */
 /* The rough map goes on to pull beside the places, with this share of its strength at first and nothing from FADED of
  * the rounds on: without it a limb slides to the nearest other one. */
 static const double MAP_SHARE = 0.3, FADED = 0.7;
@@ -58,6 +68,8 @@ typedef struct registration {
   double *diagonal, *right; /* the system */
   double *pull, *target;    /* on each vertex of a: the weight, and the weighted target (3) */
   int32_t *place, *visit;   /* of each vertex of a: the nearest one of b; of each vertex of b: the nearest one of a */
+  orb_stretch *stretch;     /* NULL: edges are only rotated */
+  double *ahead, *last;     /* of a slide: where it looks, and where it was in the last round; NULL: none */
   int is_alone;             /* no other registration runs beside this one: its loops run on all threads */
 } registration;
 
@@ -86,16 +98,20 @@ static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-static void fit_rotations(registration *r) {
+/* Rotations, and stretches where they count, for the positions as they are. */
+static void fit_surroundings(registration *r) {
   for_vertices(r, r->a.count, fit_range);
+  if (r->stretch) {
+    orb_stretch_fit(r->ctx, &r->a, r->pose->position, r->pose->rotation, r->stretch);
+  }
 }
 
-/* What the rotations at both ends make of the edge that arrives at v, summed over its edges. */
+/* What the surroundings of both ends make of the edge that arrives at v, summed over its edges. */
 static void add_edges(const registration *r, int32_t v, double sum[3]) {
   const orb_body *a = &r->a;
-  const double *here = r->pose->rotation + 9 * (size_t)v;
+  const double *linear = r->stretch ? r->stretch->linear : r->pose->rotation, *here = linear + 9 * (size_t)v;
   for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
-    const double *there = r->pose->rotation + 9 * (size_t)a->next[i];
+    const double *there = linear + 9 * (size_t)a->next[i];
     double e[3];
     orb_sub(a->mesh->positions + 3 * (size_t)v, a->mesh->positions + 3 * (size_t)a->next[i], e);
     for (int k = 0; k < 3; k++) {
@@ -180,11 +196,24 @@ static void slide(const double p[3], const double n[3], const double x[3], doubl
   }
 }
 
+/* Where the vertices of a look for places. */
+static const double *looks_from(const registration *r) {
+  return r->ahead ? r->ahead : r->pose->position;
+}
+
+static void look_ahead(registration *r) {
+  const double *position = r->pose->position;
+  for (size_t i = 0; r->ahead && i < 3 * (size_t)r->a.count; i++) {
+    r->ahead[i] = position[i] + AHEAD * (position[i] - r->last[i]);
+    r->last[i] = position[i];
+  }
+}
+
 static void find_places(void *arg, int64_t begin, int64_t end, int thread) {
   registration *r = arg;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
-    r->place[v] = orb_searched_nearest(&r->b.searched, r->pose->position + 3 * v, r->normal + 3 * v);
+    r->place[v] = orb_searched_nearest(&r->b.searched, looks_from(r) + 3 * v, r->normal + 3 * v);
   }
 }
 
@@ -198,8 +227,9 @@ static void find_visits(void *arg, int64_t begin, int64_t end, int thread) {
 
 /* Each vertex of a is pulled to the nearest place of b, and each vertex of b pulls the nearest one of a. */
 static void pull_by_place(registration *r, double weight) {
-  const double *position = r->pose->position;
+  const double *position = looks_from(r);
   double target[3];
+  look_ahead(r);
   orb_body_normals(r->a.mesh, position, r->normal, NULL);
   orb_searched_fill(position, r->normal, &r->searched);
   for_vertices(r, r->a.count, find_places);
@@ -284,7 +314,7 @@ static orb_status follow_map(registration *r) {
     pull_by_map(r, 1 / (MAP_REACH * MAP_REACH), i == 0 ? OUTLIER_FIRST : OUTLIER_MAP);
     pull_by_anchors(r);
     ORB_TRY(solve(r, 1));
-    fit_rotations(r);
+    fit_surroundings(r);
   }
   return ORB_OK;
 }
@@ -300,7 +330,7 @@ static orb_status follow_places(registration *r, int rounds, double first, doubl
     pull_by_anchors(r);
     for (int k = 0; k < TURNS; k++) {
       ORB_TRY(solve(r, k == 0));
-      fit_rotations(r);
+      fit_surroundings(r);
     }
   }
   return ORB_OK;
@@ -330,6 +360,8 @@ static void registration_free(registration *r) {
   orb_body_free(r->ctx, &r->a);
   orb_body_free(r->ctx, &r->b);
   orb_free(r->ctx, r->normal);
+  orb_free(r->ctx, r->ahead);
+  orb_free(r->ctx, r->last);
   orb_searched_free(r->ctx, &r->searched);
   orb_free(r->ctx, r->diagonal);
   orb_free(r->ctx, r->right);
@@ -400,50 +432,36 @@ end:
   return status;
 }
 
-/* Where one point goes: the mean, by barycentric coordinates, of what the corners of its place make of it. */
-static void carry_point(const orb_mesh *coarse, const orb_elastic_pose *pose, const orb_place *place, const double p[3],
-                        double out[3]) {
-  memset(out, 0, sizeof(double[3]));
-  for (int k = 0; k < 3; k++) {
-    size_t u = (size_t)coarse->triangles[3 * (size_t)place->triangle + (size_t)k];
-    double e[3];
-    orb_sub(p, coarse->positions + 3 * u, e);
-    for (int i = 0; i < 3; i++) {
-      out[i] += place->at[k] * (pose->position[3 * u + (size_t)i] + orb_dot(pose->rotation + 9 * u + 3 * i, e));
-    }
+/* What a slide needs beside what a registration has. */
+static orb_status prepare_slide(registration *r, orb_stretch *stretch) {
+  const size_t n = 3 * (size_t)r->a.count;
+  ORB_TRY(orb_stretch_create(r->ctx, r->a.count, stretch));
+  r->stretch = stretch;
+  r->ahead = ORB_NEW(r->ctx, double, n);
+  r->last = ORB_NEW(r->ctx, double, n);
+  if (!r->ahead || !r->last) {
+    return ORB_E_NO_MEMORY;
   }
-}
-
-typedef struct carrying {
-  const orb_mesh *coarse;
-  const orb_elastic_pose *pose;
-  const double *points;
-  orb_nearest *tree;
-  orb_elastic_pose *out;
-} carrying;
-
-static void carry_range(void *arg, int64_t begin, int64_t end, int thread) {
-  const carrying *c = arg;
-  (void)thread;
-  for (int64_t v = begin; v < end; v++) {
-    orb_place place;
-    const double *p = c->points + 3 * v;
-    (void)orb_nearest_query(c->tree, p, INFINITY, &place);
-    carry_point(c->coarse, c->pose, &place, p, c->out->position + 3 * v);
-    if (c->out->rotation) {
-      int most = place.at[1] > place.at[0] ? 1 : 0;
-      most = place.at[2] > place.at[most] ? 2 : most;
-      int32_t u = c->coarse->triangles[3 * (size_t)place.triangle + (size_t)most];
-      memcpy(c->out->rotation + 9 * v, c->pose->rotation + 9 * (size_t)u, sizeof(double[9]));
-    }
-  }
-}
-
-orb_status orb_elastic_carry(orb_context *ctx, const orb_mesh *coarse, const orb_elastic_pose *pose,
-                             const double *points, int32_t count, orb_elastic_pose *out) {
-  carrying c = {.coarse = coarse, .pose = pose, .points = points, .out = out};
-  ORB_TRY(orb_nearest_create(ctx, coarse->positions, coarse->triangles, coarse->triangle_count, &c.tree));
-  orb_parallel_for(ctx, count, GRAIN, carry_range, &c);
-  orb_nearest_destroy(ctx, c.tree);
+  memcpy(r->last, r->pose->position, n * sizeof *r->last);
   return ORB_OK;
+}
+
+orb_status orb_elastic_slide(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, const orb_elastic_anchors *anchors,
+                             double *position) {
+  orb_elastic_pose pose = {.position = position, .rotation = ORB_NEW(ctx, double, 9 * (size_t)a->vertex_count)};
+  registration r = {.ctx = ctx, .anchors = anchors, .pose = &pose, .is_alone = 1};
+  orb_stretch stretch = {0};
+  orb_status status = pose.rotation ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    return status;
+  }
+  ORB_GO(status, registration_create(ctx, a, b, &r), end);
+  ORB_GO(status, prepare_slide(&r, &stretch), end);
+  fit_surroundings(&r);
+  status = follow_places(&r, SLIDE_ROUNDS, SLIDE_FIRST_REACH, SLIDE_LAST_REACH);
+end:
+  registration_free(&r);
+  orb_stretch_free(ctx, &stretch);
+  orb_free(ctx, pose.rotation);
+  return status;
 }

@@ -7,7 +7,8 @@
  *
  *   searched.h  vertices, laid out for searches of the nearest one
  *   body.h      a mesh with what the steps read
- *   elastic.h   the registration
+ *   stretch.h   how the surroundings of a vertex are stretched
+ *   elastic.h   the registration; carry.c carries it to other points
  *
  * Source: Sorkine & Alexa 2007 (as-rigid-as-possible energy: rotations of vertices and positions take turns), with
  * iterative closest points (Besl & McKay 1992) in both directions.
@@ -55,6 +56,12 @@ ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh 
  * all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                              const orb_elastic_anchors *anchors, orb_elastic_pose *pose);
+
+/* Slides mesh a over mesh b until the two fit each other in space, from where a map takes its vertices. A map of little
+ * energy knows lengths only; a slide knows bumps and hollows as well. Both meshes are as in orb_elastic_register().
+ * Changes the positions, 3 a vertex. Ten rounds, as one of orb_elastic_register(). On all threads. */
+ORB_MUST_CHECK orb_status orb_elastic_slide(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
+                                            const orb_elastic_anchors *anchors, double *position);
 
 /* Carries a pose of a coarse mesh to points beside it: each point moves with the corners of its nearest triangle.
  * points: 3 each. out->rotation may be NULL. O(count log n), on all threads. */

@@ -183,6 +183,48 @@ static void anchors_reach_their_places(void **state) {
   shape_free(ctx, &b);
 }
 
+/* The radius of a potato with five bumps in a direction of length 1. */
+static double potato(const double p[3]) {
+  double r = 1;
+  for (int i = 0; i < LIMBS; i++) {
+    r += 0.2 * (reach[i] - 1) * exp(-8 * (1 - p[0] * limb[i][0] - p[1] * limb[i][1] - p[2] * limb[i][2]));
+  }
+  return r;
+}
+
+/* A potato slides over one that is taller, from a map that is pushed aside around one place. */
+static void a_slide_undoes_a_push(void **state) {
+  (void)state;
+  orb_mesh a = shape_ball(ctx, 4), b = shape_ball(ctx, 4), start = shape_ball(ctx, 4);
+  double before = 0, after = 0;
+  for (int32_t v = 0; v < a.vertex_count; v++) {
+    const double *d = a.positions + 3 * (size_t)v, angle = 0.3 * exp(-10 * (1 - d[0]));
+    const double turned[3] = {cos(angle) * d[0] - sin(angle) * d[1], sin(angle) * d[0] + cos(angle) * d[1], d[2]};
+    const double r = potato(d), there = potato(turned);
+    for (int k = 0; k < 3; k++) {
+      const size_t at = 3 * (size_t)v + (size_t)k;
+      start.positions[at] = turned[k] * there * (k == 2 ? 1.2 : 1);
+      b.positions[at] *= r * (k == 2 ? 1.2 : 1);
+      a.positions[at] *= r;
+    }
+  }
+  scale_to_sphere(&a);
+  scale_to_sphere(&b);
+  scale_to_sphere(&start);
+  for (int slid = 0; slid < 2; slid++) {
+    for (int32_t v = 0; v < a.vertex_count; v++) {
+      const double away = distance(start.positions + 3 * (size_t)v, b.positions + 3 * (size_t)v);
+      *(slid ? &after : &before) = fmax(slid ? after : before, away);
+    }
+    assert_int_equal(slid ? ORB_OK : orb_elastic_slide(ctx, &a, &b, NULL, start.positions), ORB_OK);
+  }
+  assert_true(before > 0.3);
+  assert_true(after < 0.5 * before);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+  shape_free(ctx, &start);
+}
+
 /* A map of the wrong limbs bends more. */
 static void wrong_limbs_bend(void **state) {
   (void)state;
@@ -333,10 +375,14 @@ static void the_nearest_vertex_is_found(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(a_rotation_is_found),         cmocka_unit_test(a_bent_tube_is_found),
-      cmocka_unit_test(anchors_reach_their_places),  cmocka_unit_test(wrong_limbs_bend),
-      cmocka_unit_test(a_copy_is_matched),           cmocka_unit_test(threads_change_nothing),
-      cmocka_unit_test(the_nearest_vertex_is_found), cmocka_unit_test(few_vertices_are_matched_by_rotations)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(a_rotation_is_found),
+                                     cmocka_unit_test(a_bent_tube_is_found),
+                                     cmocka_unit_test(anchors_reach_their_places),
+                                     cmocka_unit_test(a_slide_undoes_a_push),
+                                     cmocka_unit_test(wrong_limbs_bend),
+                                     cmocka_unit_test(a_copy_is_matched),
+                                     cmocka_unit_test(threads_change_nothing),
+                                     cmocka_unit_test(the_nearest_vertex_is_found),
+                                     cmocka_unit_test(few_vertices_are_matched_by_rotations)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -21,7 +21,8 @@
  *   (starts/landmark_walk.c). It has no flips from the beginning.
  * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
  *
- * Where spatial targets are given, there are other starts, and limbs are untwisted only at the end (targets.h).
+ * Where spatial targets are given, there are other starts, and limbs are untwisted only at the end (targets.h). Then
+ * the map slides to where the shapes fit each other in space (slide.h).
  *
  * Each start (start.h) is then refined up to all vertices, and no flip is allowed again. The map of least energy wins
  * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c) before the
@@ -42,6 +43,7 @@
 #include "align/map/engine/step.h"
 #include "align/map/levels.h"
 #include "align/map/lifted.h"
+#include "align/map/slide.h"
 #include "align/map/start.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
@@ -356,6 +358,9 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     const int is_hopeless = c.course.is_beaten || (c.given_target && c.best_energy > c.params.targets.hopeless);
     if (!is_hopeless && (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0])) {
       ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
+      if (c.given_target && c.keeps_angles) {
+        ORB_GO(status, orb_map_slide(&c), done);
+      }
     }
   }
   if (guide->course) {

@@ -207,6 +207,16 @@ typedef struct orb_map_params {
     int loosen;    /* and of its loosening */
   } iron;
 
+  /* Sliding the last map to where the shapes fit in space. Chosen on six pairs of posed people and six of animals of
+     the half `choose` of tests/bench/correspond.py. */
+  struct {
+    double pull; /* strength, relative to the energy of a vertex's area. Ten times as much follows closer, and costs
+                    energy */
+    int sweeps;  /* without flips, before and after */
+    int loosen;  /* with flips allowed */
+    double most; /* energy afterwards, relative to before */
+  } slide;
+
   /* Drawing a level without flips to its spatial targets. */
   struct {
     int rounds;    /* most */

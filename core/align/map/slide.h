@@ -1,0 +1,11 @@
+/* The last step towards targets: the best map slides to where the two shapes fit each other in space. */
+#ifndef ORB_ALIGN_MAP_SLIDE_H
+#define ORB_ALIGN_MAP_SLIDE_H
+
+#include "align/map/engine/run.h"
+
+/* Replaces the best map, which needs its places on the fixed shape as it is now, unless it would cost more energy than
+ * params.slide.most allows. */
+ORB_MUST_CHECK orb_status orb_map_slide(orb_map_run *run);
+
+#endif

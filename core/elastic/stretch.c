@@ -1,0 +1,145 @@
+/* The edges around a vertex, rotated back, are the edges of the mesh as given under a linear map. That map is fitted to
+ * the moments of the edges: Σ q pᵀ (Σ p pᵀ)⁻¹, where p is an edge as given and q the same edge now. The moments are
+ * smoothed over the neighbours first. So a stretch that the surroundings share costs nothing, and one that differs from
+ * place to place does. Flat surroundings say nothing of their third direction, so some of the mean stretch is added. */
+#include "elastic/stretch.h"
+
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "numeric/vec3.h"
+
+enum {
+  MOMENTS = 18,     /* of a vertex: those of q with p, then those of p with itself */
+  GRAIN = 128,      /* vertices of one task */
+  ROUND_EACH = 600, /* vertices of a mesh for each round of smoothing, which then reaches a tenth of the girth of a body
+                       at any resolution. Four times as much is as good */
+  ROUNDS_LEAST = 4,
+  ROUNDS_MOST = 40
+};
+/* Of the mean stretch, against the moments. Less lets noise stretch thin limbs, more keeps girths from changing. */
+static const double MEAN_SHARE = 0.2;
+
+typedef struct fitting {
+  const orb_body *body;
+  const double *position, *rotation;
+  orb_stretch *stretch;
+} fitting;
+
+orb_status orb_stretch_create(orb_context *ctx, int32_t count, orb_stretch *out) {
+  out->linear = ORB_NEW(ctx, double, 9 * (size_t)count);
+  out->moment = ORB_NEW(ctx, double, MOMENTS *(size_t)count);
+  out->next = ORB_NEW(ctx, double, MOMENTS *(size_t)count);
+  return out->linear && out->moment && out->next ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+void orb_stretch_free(orb_context *ctx, orb_stretch *stretch) {
+  orb_free(ctx, stretch->linear);
+  orb_free(ctx, stretch->moment);
+  orb_free(ctx, stretch->next);
+}
+
+static void gather_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const fitting *f = arg;
+  const orb_body *body = f->body;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    double *m = f->stretch->moment + MOMENTS * v;
+    const double *r = f->rotation + 9 * v;
+    memset(m, 0, MOMENTS * sizeof *m);
+    for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
+      double p[3], now[3], q[3];
+      orb_sub(body->mesh->positions + 3 * (size_t)body->next[i], body->mesh->positions + 3 * v, p);
+      orb_sub(f->position + 3 * (size_t)body->next[i], f->position + 3 * v, now);
+      for (int k = 0; k < 3; k++) {
+        q[k] = r[k] * now[0] + r[3 + k] * now[1] + r[6 + k] * now[2];
+      }
+      orb_add_outer(m, q, p, body->weight[i]);
+      orb_add_outer(m + 9, p, p, body->weight[i]);
+    }
+  }
+}
+
+/* One round: the mean of a vertex and its neighbours, by their areas. */
+static void smooth_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const fitting *f = arg;
+  const orb_body *body = f->body;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    const double *m = f->stretch->moment;
+    double all = body->mass[v], *sum = f->stretch->next + MOMENTS * v;
+    for (int k = 0; k < MOMENTS; k++) {
+      sum[k] = all * m[MOMENTS * v + k];
+    }
+    for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
+      const double mass = body->mass[body->next[i]];
+      all += mass;
+      for (int k = 0; k < MOMENTS; k++) {
+        sum[k] += mass * m[MOMENTS * (int64_t)body->next[i] + k];
+      }
+    }
+    for (int k = 0; k < MOMENTS; k++) {
+      sum[k] /= all;
+    }
+  }
+}
+
+/* Row-major a b⁻¹ of a symmetric b. Returns 0 where b has no inverse. */
+static int divide(const double a[9], const double b[9], double out[9]) {
+  double c0[3], c1[3], c2[3];
+  orb_cross(b + 3, b + 6, c0);
+  orb_cross(b + 6, b, c1);
+  orb_cross(b, b + 3, c2);
+  const double det = orb_dot(b, c0);
+  if (!(det > 0)) {
+    return 0;
+  }
+  for (int i = 0; i < 3; i++) {
+    const double *row = a + 3 * i;
+    out[3 * i] = orb_dot(row, c0) / det;
+    out[3 * i + 1] = orb_dot(row, c1) / det;
+    out[3 * i + 2] = orb_dot(row, c2) / det;
+  }
+  return 1;
+}
+
+static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const fitting *f = arg;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    double *m = f->stretch->moment + MOMENTS * v, *linear = f->stretch->linear + 9 * v, stretched[9];
+    const double *r = f->rotation + 9 * v, given = MEAN_SHARE * (m[9] + m[13] + m[17]),
+                 now = MEAN_SHARE * (m[0] + m[4] + m[8]);
+    for (int k = 0; k < 9; k += 4) {
+      m[k] += now;
+      m[9 + k] += given;
+    }
+    if (!divide(m, m + 9, stretched)) {
+      memcpy(linear, r, sizeof(double[9]));
+      continue;
+    }
+    for (int i = 0; i < 9; i++) {
+      linear[i] = 0;
+      for (int k = 0; k < 3; k++) {
+        linear[i] += r[i / 3 * 3 + k] * stretched[3 * k + i % 3];
+      }
+    }
+  }
+}
+
+void orb_stretch_fit(orb_context *ctx, const orb_body *body, const double *position, const double *rotation,
+                     orb_stretch *stretch) {
+  fitting f = {body, position, rotation, stretch};
+  const int32_t wanted = body->count / ROUND_EACH, rounds = wanted < ROUNDS_LEAST  ? ROUNDS_LEAST
+                                                            : wanted > ROUNDS_MOST ? ROUNDS_MOST
+                                                                                   : wanted;
+  orb_parallel_for(ctx, body->count, GRAIN, gather_range, &f);
+  for (int32_t i = 0; i < rounds; i++) {
+    orb_parallel_for(ctx, body->count, GRAIN, smooth_range, &f);
+    double *moment = stretch->moment;
+    stretch->moment = stretch->next;
+    stretch->next = moment;
+  }
+  orb_parallel_for(ctx, body->count, GRAIN, fit_range, &f);
+}

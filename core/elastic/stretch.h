@@ -1,0 +1,21 @@
+/* How a pose stretches the surroundings of each vertex. */
+#ifndef ORB_ELASTIC_STRETCH_H
+#define ORB_ELASTIC_STRETCH_H
+
+#include "elastic/body.h"
+
+typedef struct orb_stretch {
+  double *linear;        /* 9 a vertex, row-major: what the pose makes of its surroundings, rotated and stretched */
+  double *moment, *next; /* 18 a vertex */
+} orb_stretch;
+
+/* Room for as many vertices. Free `out` in any case. */
+ORB_MUST_CHECK orb_status orb_stretch_create(orb_context *ctx, int32_t count, orb_stretch *out);
+void orb_stretch_free(orb_context *ctx, orb_stretch *stretch);
+
+/* Fits stretch->linear to a body at these positions (3 a vertex), whose vertices have rotated so far (9 each).
+ * O(n · rounds of smoothing), on all threads. */
+void orb_stretch_fit(orb_context *ctx, const orb_body *body, const double *position, const double *rotation,
+                     orb_stretch *stretch);
+
+#endif
