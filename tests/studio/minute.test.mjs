@@ -394,3 +394,23 @@ test('a link whose morph or shapes are gone says so', async () => {
     await done();
   }
 });
+
+test('a link whose shapes are gone says so once, also if its morph is looked for after that', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  let answer;
+  const dismissed = new Promise((resolve) => (answer = resolve));
+  await page.route('**/v1/supermeshes/*', async (route) => {
+    await dismissed;
+    await route.continue();
+  });
+  const answered = page.waitForResponse('**/v1/supermeshes/*');
+  await page.goto(`${daemon.url}/#m=${'a'.repeat(64)}&r=${'c'.repeat(64)}`); // the page reloads by itself
+  await page.getByRole('alert').getByText('Its shape is not on the server').waitFor();
+  await button(page, 'Dismiss').click();
+  await page.getByRole('alert').waitFor({ state: 'detached' });
+  answer();
+  assert.equal((await answered).status(), 404);
+  await settled(page);
+  assert.equal(await page.getByRole('alert').count(), 0);
+  await done();
+});
