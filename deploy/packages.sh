@@ -7,9 +7,9 @@ orb_build_packages=(
   zlib1g-dev libexpat1-dev libzstd-dev
 )
 orb_test_packages=(
-  libcmocka-dev clang-format openssl sqlite3 postgresql swift-proxy swift-account swift-container swift-object zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium nginx haproxy
+  libcmocka-dev clang-format openssl sqlite3 postgresql swift-proxy swift-account swift-container swift-object zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium-headless-shell nginx haproxy
 )
-orb_fuzz_packages=(clang libclang-rt-dev)
+orb_fuzz_packages=(clang libclang-rt-dev lld)
 orb_long_packages=(
   pgbouncer valgrind wrk blender python3-numpy caddy debootstrap lintian buildah podman runc prometheus systemd
 )

@@ -11,9 +11,9 @@ import { daemon } from '../scenario/support/daemon.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { writePng } from '../scenario/support/png.mjs';
 import * as shapes from '../scenario/support/shapes.mjs';
+import { executablePath, softwareGl } from '../tools/chromium.mjs';
 
 const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
-const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
 const needed = ['three', 'gltf-validator', 'playwright-core'].map((name) => path.join(modules, name));
 if (![...needed, executablePath].every((file) => fs.existsSync(file))) {
   console.log('Chromium or the npm packages are missing: npm ci in tests/');
@@ -327,13 +327,7 @@ test('the asset looks like the file, with its bumps and its transform', async (t
     fs.createReadStream(file).pipe(response);
   });
   await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  const args = [
-    '--no-sandbox',
-    '--headless=new',
-    '--use-gl=angle',
-    '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader',
-  ];
+  const args = ['--no-sandbox', ...softwareGl];
   const browser = await chromium.launch({ timeout: 180_000, executablePath, args });
   t.after(async () => {
     await browser.close();

@@ -3,9 +3,9 @@ import fs from 'node:fs';
 import http from 'node:http';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { executablePath, softwareGl } from '../tools/chromium.mjs';
 
 const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
-const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
 const types = {
   '.html': 'text/html',
   '.js': 'text/javascript',
@@ -46,10 +46,7 @@ export async function startBrowser() {
     executablePath,
     args: [
       '--no-sandbox',
-      '--headless=new',
-      '--use-gl=angle',
-      '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader',
+      ...softwareGl,
       '--disable-background-networking',
       '--disable-component-update',
       '--no-first-run',

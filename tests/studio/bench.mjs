@@ -10,6 +10,7 @@ import { tmpdir } from 'node:os';
 import { extname, join } from 'node:path';
 import { glb, icosphere, objFiles } from './bench/shapes.mjs';
 import { traced } from './bench/tasks.mjs';
+import { wholeBrowser } from '../tools/chromium.mjs';
 import { root, startBrowser, until } from './support.mjs';
 
 const level = Number(process.argv.slice(2).find((a) => /^\d+$/.test(a)) ?? 7);
@@ -90,7 +91,7 @@ const server = createServer((req, res) => {
 });
 await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
 const url = `http://127.0.0.1:${server.address().port}`;
-const browser = await startBrowser({ compositing });
+const browser = await startBrowser({ compositing, program: wholeBrowser });
 
 /**
  * Sets a new value as soon as the last one is drawn, 22 times. Returns the median time between drawings. The studio

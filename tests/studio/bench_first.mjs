@@ -4,6 +4,7 @@
 //   node tests/studio/bench_first.mjs [ROUNDS] [given|found | FILE FILE]
 //
 // By default five rounds of dog.obj and giraffe.off with given landmarks, and five without.
+import { wholeBrowser } from '../tools/chromium.mjs';
 import { addFiles, button, defaultShown, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
 
 const [rounds = 5, ...rest] = process.argv.slice(2);
@@ -50,7 +51,7 @@ async function round(browser, pair, marks) {
   return times;
 }
 
-const browser = await startBrowser({ compositing: 'gpu' });
+const browser = await startBrowser({ compositing: 'gpu', program: wholeBrowser });
 const samples = [sample('dog.obj'), sample('giraffe.off')];
 const rows = {
   given: ['dog – giraffe, 21 landmarks', samples, sample('dog-giraffe.json')],

@@ -3,7 +3,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { browser, daemon } from './started.mjs';
 import { landmarked, landmarks, morph, seek } from './steps.mjs';
-import { difference } from './pictures.mjs';
+import { difference, shot } from './pictures.mjs';
 import { addFiles, button, counted, openPage, sample, settled, until } from './support.mjs';
 
 test('side by side, the morph moves between its shapes under one camera', async () => {
@@ -22,11 +22,9 @@ test('side by side, the morph moves between its shapes under one camera', async 
       .locator('.pane-view')
       .evaluateAll((all) => all.map((e) => e.getBoundingClientRect().toJSON()));
     const width = Math.floor(Math.min(...boxes.map((box) => box.width))) - 4;
-    const shot = ({ x, y, height }) =>
-      page.screenshot({
-        clip: { x: Math.round(x) + 2, y: Math.round(y) + 44, width, height: Math.floor(height) - 48 },
-      });
-    return [await shot(boxes[0]), await shot(boxes[1]), await shot(boxes[2])];
+    const view = ({ x, y, height }) =>
+      shot(page, { x: Math.round(x) + 2, y: Math.round(y) + 44, width, height: Math.floor(height) - 48 });
+    return [await view(boxes[0]), await view(boxes[1]), await view(boxes[2])];
   };
   const apart = (a, b) => difference(browser, a, b);
   await seek(page, 0);
@@ -85,7 +83,7 @@ test('linked cameras rotate together, others alone', async () => {
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   const views = async () => {
     await settled(page);
-    return [await page.locator('.pane').nth(0).screenshot(), await page.locator('.pane').nth(1).screenshot()];
+    return [await shot(page.locator('.pane').nth(0)), await shot(page.locator('.pane').nth(1))];
   };
   const turn = async () => {
     await page.locator('.pane-view').first().focus();
@@ -118,7 +116,7 @@ test('spheres before and after the alignment: certified, painted, measured', asy
   for (const name of ['Normals', 'Checkerboard', 'Stretch', 'Areas']) {
     await button(page, name).click();
     await settled(page);
-    shots.push(await page.locator('.stage-area').screenshot());
+    shots.push(await shot(page.locator('.stage-area')));
   }
   for (let i = 1; i < shots.length; i++)
     assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
@@ -151,13 +149,13 @@ test('spheres before and after the alignment: certified, painted, measured', asy
   await settled(page);
   assert.ok(gap(await spots()) < 1, 'after the alignment landmarks coincide');
   await until(() => /side=after/.test(page.url()), 'the URL says so');
-  const shown = await page.locator('.pane').nth(1).screenshot();
+  const shown = await shot(page.locator('.pane').nth(1));
   await page.reload();
   await counted(page.getByText('on the common sphere'), 2, 'also after a reload');
   await counted(page.locator('.marker.small'), 2 * count, 'with their landmarks');
   await settled(page);
   await until(
-    async () => (await difference(browser, shown, await page.locator('.pane').nth(1).screenshot())) < 0.01,
+    async () => (await difference(browser, shown, await shot(page.locator('.pane').nth(1)))) < 0.01,
     'it looks the same',
   );
   await done();

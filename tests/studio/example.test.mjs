@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { join } from 'node:path';
 import { browser, daemon } from './started.mjs';
-import { difference } from './pictures.mjs';
+import { difference, shot } from './pictures.mjs';
 import { openPage, root, sample, until } from './support.mjs';
 
 let server;
@@ -32,8 +32,8 @@ test('the example plays a morph of two files', async () => {
         .then((text) => /\d+ triangles for dog, giraffe/.test(text)),
     'the morph is there',
   );
-  const first = await page.screenshot();
-  await until(async () => (await difference(browser, first, await page.screenshot())) > 0.005, 'it moves');
+  const first = await shot(page);
+  await until(async () => (await difference(browser, first, await shot(page))) > 0.005, 'it moves');
   await done();
 });
 

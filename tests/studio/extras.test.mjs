@@ -9,7 +9,7 @@ import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { writePng } from '../scenario/support/png.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { countPixels, difference } from './pictures.mjs';
+import { countPixels, difference, shot } from './pictures.mjs';
 import { addFiles, button, defaultShown, json, openPage, settled, until } from './support.mjs';
 
 /** Texture coordinates by a projection; the picture has one colour, so front and back may share texels. */
@@ -100,10 +100,10 @@ test('a skin, targets and a texture of the second shape are taken by a tick each
 
   const targets = page.getByRole('group', { name: 'Targets of the files' });
   assert.deepEqual(await targets.locator('label').allInnerTexts(), ['target 0']);
-  const before = await page.locator('.pane-view').first().screenshot();
+  const before = await shot(page.locator('.pane-view').first());
   await targets.getByRole('slider').fill('1');
   await settled(page);
-  const after = await page.locator('.pane-view').first().screenshot();
+  const after = await shot(page.locator('.pane-view').first());
   assert.ok((await difference(browser, before, after)) > 0.005, 'the target moves the shape where the morph stands');
   await assertPage(page, (other) => until(async () => (await red(other, 'canvas')) > 1000, 'the page has the look'));
 

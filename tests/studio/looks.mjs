@@ -44,7 +44,7 @@ const pierced = () => {
   ];
   return { name: 'dog.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(tunnels(dog, at))) };
 };
-const open = () =>
+const holed = () =>
   without('dog.obj', () => {
     let left = 60;
     return (line) => !(line.startsWith('f ') && left-- > 0);
@@ -80,7 +80,10 @@ async function spheres(page) {
   await counted(working, 0, 'both spheres are loaded');
 }
 
-/** name: [steps that lead to the scene, options of the page] */
+/**
+ * name: [steps that lead to the scene, options of the page, the scene that the steps begin at]. Without the third they begin
+ * at an empty page.
+ */
 export const SCENES = {
   empty: [welcome, STILL],
   'empty-dark': [welcome, { colorScheme: 'dark', ...STILL }],
@@ -95,7 +98,7 @@ export const SCENES = {
   'shapes-small': [(page) => addFiles(page, ...pair), SMALL],
   refused: [
     async (page) => {
-      await page.locator('input[type=file]').first().setInputFiles([open()]);
+      await page.locator('input[type=file]').first().setInputFiles([holed()]);
       await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
     },
   ],
@@ -118,6 +121,33 @@ export const SCENES = {
       await slide(page, 'Along the morph', 0.5);
     },
   ],
+  each: [(page) => button(page, 'Each shape').click(), {}, 'morph'],
+  error: [
+    async (page) => {
+      await button(page, 'Error').click();
+      await counted(page.locator('.pane .legend'), 2, 'both are measured');
+    },
+    {},
+    'each',
+  ],
+  'spheres-before': [spheres, {}, 'error'],
+  'spheres-after': [
+    async (page) => {
+      await button(page, 'Checkerboard').click();
+      await button(page, 'After').click();
+      await counted(page.getByText('on the common sphere'), 2, 'they are aligned');
+      await until(
+        () =>
+          page
+            .locator('.marker.small')
+            .count()
+            .then((n) => n > 2),
+        'landmarks are on them',
+      );
+    },
+    {},
+    'spheres-before',
+  ],
   'morph-dark': [
     async (page) => {
       await morphed(page);
@@ -133,47 +163,11 @@ export const SCENES = {
     },
     SMALL,
   ],
-  each: [
-    async (page) => {
-      await morphed(page);
-      await button(page, 'Each shape').click();
-    },
-  ],
-  error: [
-    async (page) => {
-      await morphed(page);
-      await button(page, 'Error').click();
-      await counted(page.locator('.pane .legend'), 2, 'both are measured');
-    },
-  ],
   'use-it': [
     async (page) => {
       await morphed(page);
       await slide(page, 'Along the morph', 0); // it may be playing
       await button(page, 'Use it').click();
-    },
-  ],
-  'spheres-before': [
-    async (page) => {
-      await morphed(page);
-      await spheres(page);
-    },
-  ],
-  'spheres-after': [
-    async (page) => {
-      await morphed(page);
-      await spheres(page);
-      await button(page, 'Checkerboard').click();
-      await button(page, 'After').click();
-      await counted(page.getByText('on the common sphere'), 2, 'they are aligned');
-      await until(
-        () =>
-          page
-            .locator('.marker.small')
-            .count()
-            .then((n) => n > 2),
-        'landmarks are on them',
-      );
     },
   ],
   'heat-map': [
@@ -188,36 +182,69 @@ export const SCENES = {
 /** Hides what differs between runs: timings and the text cursor. */
 const STEADY = '[data-varies] { visibility: hidden !important; } * { caret-color: transparent !important; }';
 
-/** Takes a picture of a scene as PNG, at half size or at full size (`whole`). */
-export async function look(browser, url, name, whole = false) {
-  const [reach, options] = SCENES[name];
-  const { page, done } = await openPage(browser, url, { colorScheme: 'light', ...options });
-  await page.evaluate(() => document.fonts.ready);
-  await reach(page);
-  await adopt(page, STEADY);
-  await hideToasts(page);
-  await page.mouse.move(2, 2);
-  await page.evaluate(() => document.activeElement?.blur());
-  await settled(page);
-  const full = await page.screenshot({ animations: 'disabled' });
-  const png = whole ? full : await halved(browser, full);
-  await done();
-  return png;
+/** Opens a page and leads it to a scene. */
+async function open(browser, url, name) {
+  const [reach, options, from] = SCENES[name];
+  if (!from) {
+    const opened = await openPage(browser, url, { colorScheme: 'light', ...options });
+    await opened.page.evaluate(() => document.fonts.ready);
+    await reach(opened.page);
+    return opened;
+  }
+  const opened = await open(browser, url, from);
+  await reach(opened.page);
+  return opened;
+}
+
+/**
+ * Takes a picture of a scene as PNG, at half size or at full size (`whole`). A scene that begins at the one before goes on
+ * with its page; `close` closes the page of the last one.
+ */
+export function photographer(browser, url) {
+  let last = null; // { name, page, done }
+  const close = async () => {
+    const closing = last;
+    last = null;
+    await closing?.done();
+  };
+  const look = async (name, whole = false) => {
+    const [reach, , from] = SCENES[name];
+    const opened = last;
+    if (opened && from === opened.name) {
+      last = null; // a scene that fails takes the page with it
+      await reach(opened.page);
+      last = { ...opened, name };
+    } else {
+      await close();
+      last = { name, ...(await open(browser, url, name)) };
+    }
+    const { page } = last;
+    await adopt(page, STEADY);
+    await hideToasts(page);
+    await page.mouse.move(2, 2);
+    await page.evaluate(() => document.activeElement?.blur());
+    await settled(page);
+    const full = await page.screenshot({ animations: 'disabled' });
+    return whole ? full : halved(browser, full);
+  };
+  return { look, close };
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
   mkdirSync(folder, { recursive: true });
   const daemon = await startDaemon();
   const browser = await startBrowser();
+  const { look, close } = photographer(browser, daemon.url);
   try {
     const picture = process.env.ORB_PICTURE;
-    if (picture) writeFileSync(picture, await look(browser, daemon.url, process.argv[2], true));
+    if (picture) writeFileSync(picture, await look(process.argv[2], true));
     else
       for (const name of process.argv.length > 2 ? process.argv.slice(2) : Object.keys(SCENES)) {
-        const png = await look(browser, daemon.url, name);
+        const png = await look(name);
         writeFileSync(join(folder, `${name}.png`), png);
         console.log(`${name}.png ${png.length} bytes`);
       }
+    await close();
   } finally {
     await browser.close();
     await daemon.stop();

@@ -5,15 +5,19 @@ import { existsSync } from 'node:fs';
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { folder, look, SCENES } from './looks.mjs';
+import { folder, photographer, SCENES } from './looks.mjs';
 import { apart } from './pictures.mjs';
 import { browser, daemon } from './started.mjs';
 
-for (const name of Object.keys(SCENES))
+const { look, close } = photographer(browser, daemon.url);
+
+const names = Object.keys(SCENES);
+for (const [i, name] of names.entries())
   test(name, async () => {
     const stored = join(folder, `${name}.png`);
     assert.ok(existsSync(stored), `${stored} is missing: node tests/studio/looks.mjs ${name}`);
-    const now = await look(browser, daemon.url, name);
+    const now = await look(name);
+    if (SCENES[names[i + 1]]?.[2] !== name) await close();
     const { share, mean, size } = await apart(browser, now, await readFile(stored));
     const kept = join(tmpdir(), 'orbmorph-looks', `${name}.png`);
     const fine = share < 0.03 && mean < 4;

@@ -7,7 +7,7 @@ import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { browser, daemon } from './started.mjs';
-import { countPixels, difference } from './pictures.mjs';
+import { countPixels, difference, shot } from './pictures.mjs';
 import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
 import { morphOf } from '../scenario/support/glb.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
@@ -16,7 +16,7 @@ import { ball, threeMf } from '../scenario/support/shapes.mjs';
 
 /** Pixels of a shape on the first page: they are more saturated than its background. */
 const vivid = (r, g, b) => Math.max(r, g, b) - Math.min(r, g, b) > 70;
-const hero = (page) => page.locator('.hero').screenshot();
+const hero = (page) => shot(page.locator('.hero'));
 
 test('the first page plays a morph without a click, and offers three more', async () => {
   const { page, done } = await openPage(browser, daemon.url);
@@ -141,25 +141,25 @@ test('the downloaded page plays the morph from a file, without a network', async
   await other.locator('body[data-ready]').waitFor();
   const shape = (r, _g, b) => r - b > 45; // the dog's tint: more than the background, and no button
   await until(async () => (await countPixels(other, 'canvas', shape)) > 3000, 'the morph appears in its tints');
-  const first = await other.screenshot();
-  await until(async () => (await difference(browser, first, await other.screenshot())) > 0.02, 'it plays');
+  const first = await shot(other);
+  await until(async () => (await difference(browser, first, await shot(other))) > 0.02, 'it plays');
   await other.getByRole('button', { name: 'Pause' }).click();
   const slider = other.getByRole('slider', { name: 'Along the morph' });
   await slider.fill('0');
   await other.waitForTimeout(200);
-  const dog = await other.screenshot();
+  const dog = await shot(other);
   await slider.fill('1');
   await other.waitForTimeout(200);
-  assert.ok((await difference(browser, dog, await other.screenshot())) > 0.02, 'the other end is another shape');
+  assert.ok((await difference(browser, dog, await shot(other))) > 0.02, 'the other end is another shape');
   assert.match(await slider.getAttribute('aria-valuetext'), /giraffe/);
   const box = await other.locator('canvas').boundingBox();
-  const before = await other.screenshot();
+  const before = await shot(other);
   await other.mouse.move(box.width / 2, box.height / 2);
   await other.mouse.down();
   await other.mouse.move(box.width / 2 + 90, box.height / 2, { steps: 4 });
   await other.mouse.up();
   await other.waitForTimeout(200);
-  assert.ok((await difference(browser, before, await other.screenshot())) > 0.02, 'dragging rotates it');
+  assert.ok((await difference(browser, before, await shot(other))) > 0.02, 'dragging rotates it');
   assert.deepEqual(faults, []);
   await context.close();
   await page.keyboard.press('Escape');
@@ -311,19 +311,18 @@ function dressed() {
 async function halves(page, index) {
   await settled(page);
   const { x, y, width, height } = await page.locator('.pane-view').nth(index).boundingBox();
-  return Promise.all(
-    [y, y + height / 2].map(async (top) => {
-      const clip = { x, y: top, width, height: height / 2 };
-      const [pixels] = readPng(await page.screenshot({ clip })).frames;
-      const found = [0, 0, 0];
-      for (let i = 0; i < pixels.length; i += 3) {
-        const rgb = [...pixels.subarray(i, i + 3)];
-        const strongest = rgb.indexOf(Math.max(...rgb));
-        if (rgb.every((c, k) => k === strongest || c < 0.5 * rgb[strongest])) found[strongest]++;
-      }
-      return found;
-    }),
-  );
+  const counts = [];
+  for (const top of [y, y + height / 2]) {
+    const [pixels] = readPng(await shot(page, { x, y: top, width, height: height / 2 })).frames;
+    const found = [0, 0, 0];
+    for (let i = 0; i < pixels.length; i += 3) {
+      const rgb = [...pixels.subarray(i, i + 3)];
+      const strongest = rgb.indexOf(Math.max(...rgb));
+      if (rgb.every((c, k) => k === strongest || c < 0.5 * rgb[strongest])) found[strongest]++;
+    }
+    counts.push(found);
+  }
+  return counts;
 }
 
 test('textures and colours of the files are on the stage, before and after the morph', async () => {
@@ -394,4 +393,24 @@ test('a link whose morph or shapes are gone says so', async () => {
     await alert.waitFor({ state: 'detached' });
     await done();
   }
+});
+
+test('a link whose shapes are gone says so once, also if its morph is looked for after that', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  let answer;
+  const dismissed = new Promise((resolve) => (answer = resolve));
+  await page.route('**/v1/supermeshes/*', async (route) => {
+    await dismissed;
+    await route.continue();
+  });
+  const answered = page.waitForResponse('**/v1/supermeshes/*');
+  await page.goto(`${daemon.url}/#m=${'a'.repeat(64)}&r=${'c'.repeat(64)}`); // the page reloads by itself
+  await page.getByRole('alert').getByText('Its shape is not on the server').waitFor();
+  await button(page, 'Dismiss').click();
+  await page.getByRole('alert').waitFor({ state: 'detached' });
+  answer();
+  assert.equal((await answered).status(), 404);
+  await settled(page);
+  assert.equal(await page.getByRole('alert').count(), 0);
+  await done();
 });

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
 import { browser, daemon } from './started.mjs';
-import { difference } from './pictures.mjs';
+import { difference, shot } from './pictures.mjs';
 import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
 
 let axe;
@@ -163,7 +163,7 @@ test('keys rotate the view and change the page; at rest nothing is drawn', async
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await settled(page);
-  const still = await page.locator('.stage-area').screenshot();
+  const still = await shot(page.locator('.stage-area'));
   const frames = await page.evaluate(() => {
     let count = 0;
     document.querySelector('.stage').addEventListener('drawn', () => count++);
@@ -173,13 +173,13 @@ test('keys rotate the view and change the page; at rest nothing is drawn', async
   await page.locator('.pane-view').first().focus();
   for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowLeft');
   await settled(page);
-  const rotated = await page.locator('.stage-area').screenshot();
+  const rotated = await shot(page.locator('.stage-area'));
   assert.ok((await difference(browser, still, rotated)) > 0.01, 'the view has rotated');
   await page.keyboard.press('0');
   await settled(page);
   // now with the focus ring; little else may differ
   assert.ok(
-    (await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01,
+    (await difference(browser, still, await shot(page.locator('.stage-area')))) < 0.01,
     'the view is as at first',
   );
   await page.keyboard.press('2');

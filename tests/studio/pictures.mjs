@@ -1,4 +1,4 @@
-// Compares pictures and counts their pixels. Chromium decodes them, in one blank page a browser: to open a page takes it
+// Takes pictures, compares them and counts their pixels. Chromium decodes them, in one blank page a browser: to open a page takes it
 // five times as long as to compare two pictures.
 const pages = new WeakMap();
 
@@ -23,9 +23,35 @@ async function open(browser) {
   return page;
 }
 
+const sessions = new WeakMap();
+
+/**
+ * A picture (PNG) of a page, or of the one element that a locator finds, or of a part of the page (`clip`). Playwright's
+ * own takes four times the CPU time: it makes the file as small as it can. Take pictures of a page one after the other:
+ * Chromium mixes up the parts of two that it takes at once.
+ */
+export async function shot(what, clip) {
+  const page = what.page?.() ?? what;
+  if (what !== page)
+    clip = await what.evaluate((element) => {
+      element.scrollIntoViewIfNeeded();
+      const { left, top, right, bottom } = element.getBoundingClientRect();
+      const [x, y] = [Math.floor(left), Math.floor(top)];
+      return { x, y, width: Math.ceil(right) - x, height: Math.ceil(bottom) - y };
+    });
+  if (!sessions.has(page)) sessions.set(page, page.context().newCDPSession(page));
+  const session = await sessions.get(page);
+  const { data } = await session.send('Page.captureScreenshot', {
+    format: 'png',
+    optimizeForSpeed: true,
+    ...(clip && { clip: { ...clip, scale: 1 } }),
+  });
+  return Buffer.from(data, 'base64');
+}
+
 /** Counts the pixels in a screenshot of `selector` that `test(r, g, b)` accepts. */
 export async function countPixels(page, selector, test) {
-  const png = await page.locator(selector).first().screenshot();
+  const png = await shot(page.locator(selector).first());
   return (await blank(page.context().browser())).evaluate(
     async ({ picture, source }) => {
       const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);

@@ -1,20 +1,18 @@
 // Runs one test file. Exits with 77 (skipped) and names what is missing if it cannot run.
-import { spawn } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
+import { executablePath } from '../tools/chromium.mjs';
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const needed = {
   'client/web/node_modules (client/web/build.sh)': here('../../client/web/node_modules/esbuild'),
   'client/web/dist (client/web/build.sh)': here('../../client/web/dist/index.html'),
   'tests/node_modules (npm ci in tests/)': here('../node_modules/playwright-core'),
-  chromium: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
+  chromium: executablePath,
 };
 for (const [what, path] of Object.entries(needed))
   if (!existsSync(path)) {
     console.log(`skipped: ${what} is missing`);
     process.exit(77);
   }
-spawn(process.execPath, ['--test', here(process.argv[2])], { stdio: 'inherit' }).on('exit', (code) =>
-  process.exit(code ?? 1),
-);
+await import(new URL(process.argv[2], import.meta.url));

@@ -1,4 +1,4 @@
-// Starts a daemon on a free port with a fresh folder, Debian's Chromium, and pages that record every console error,
+// Starts a daemon on a free port with a fresh folder, Chromium, and pages that record every console error,
 // every exception and every request to another origin; `done` fails the test if there was any.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
@@ -7,6 +7,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { chromium } from 'playwright-core';
+import { executablePath, softwareGl } from '../tools/chromium.mjs';
 
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 export const sample = (name) => join(root, 'tests/samples', name);
@@ -55,20 +56,17 @@ export async function startDaemon({
 }
 
 /**
- * Starts Debian's Chromium with software GL. `compositing`: "software", the most robust, reads every drawn canvas back
+ * Starts Chromium with software GL. `compositing`: "software", the most robust, reads every drawn canvas back
  * on the page's main thread; "gpu" composites pages with the same GL, as browsers with a GPU do.
  */
-export const startBrowser = ({ compositing = 'software' } = {}) =>
+export const startBrowser = ({ compositing = 'software', program = executablePath } = {}) =>
   chromium.launch({
     timeout: PATIENCE,
-    executablePath: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
+    executablePath: program,
     args: [
       '--no-sandbox',
-      '--headless=new',
       ...(compositing === 'software' ? ['--disable-gpu'] : ['--ignore-gpu-blocklist']),
-      '--use-gl=angle',
-      '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader',
+      ...softwareGl,
       '--disable-background-networking',
       '--disable-component-update',
       '--disable-sync',

@@ -57,6 +57,19 @@ test('without a token the page asks for one, and rejects an unknown one', async 
   await done();
 });
 
+test('the dialog appears even if the daemon answers before the first frame', async () => {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  await page.addInitScript(() => {
+    const late = globalThis.setTimeout;
+    globalThis.setTimeout = (call, ms = 0, ...rest) => late(call, ms + 3000, ...rest);
+    globalThis.requestAnimationFrame = (call) => late(() => call(performance.now()), 3000);
+  });
+  await page.goto(daemon.url);
+  await page.getByRole('dialog', { name: 'This daemon requires a token' }).waitFor();
+  await context.close();
+});
+
 test('with a token everything works; the token stays in the tab and out of URLs', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const addresses = [];

@@ -9,7 +9,7 @@ import { promisify } from 'node:util';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { landmarked, landmarks, morph, scrubber, seek, shownId, slide, startOccupied } from './steps.mjs';
-import { countPixels, difference } from './pictures.mjs';
+import { countPixels, difference, shot } from './pictures.mjs';
 import {
   addFiles,
   button,
@@ -59,24 +59,21 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   for (const t of [0, 0.5, 1]) {
     await seek(page, t);
     await settled(page);
-    shots.push(await page.locator('.stage-area').screenshot());
+    shots.push(await shot(page.locator('.stage-area')));
   }
   assert.ok((await difference(browser, shots[0], shots[1])) > 0.005, 'halfway differs from the first shape');
   assert.ok((await difference(browser, shots[1], shots[2])) > 0.005, 'halfway differs from the second shape');
 
   await slide(page.getByRole('slider', { name: 'Share of dog' }), 0.5);
   await settled(page);
-  assert.ok(
-    (await difference(browser, await page.locator('.pane').screenshot(), await page.locator('.pane').screenshot())) ===
-      0,
-  );
+  assert.ok((await difference(browser, await shot(page.locator('.pane')), await shot(page.locator('.pane')))) === 0);
   assert.equal(await page.getByRole('slider', { name: 'Share of giraffe' }).inputValue(), '0.5');
 
-  const plain = await page.locator('.stage-area').screenshot();
+  const plain = await shot(page.locator('.stage-area'));
   await page.getByRole('switch', { name: 'Wireframe' }).click();
   await settled(page);
   assert.ok(
-    (await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005,
+    (await difference(browser, plain, await shot(page.locator('.stage-area')))) > 0.005,
     'the wireframe is drawn',
   );
   // The wireframe is on in “Each shape” by default, and in “Error” since the step above. The switch hides it in both.
@@ -93,11 +90,11 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
       );
     assert.ok(await page.getByRole('switch', { name: 'Wireframe' }).isChecked(), view);
     await settled(page);
-    const drawn = await page.locator('.stage-area').screenshot();
+    const drawn = await shot(page.locator('.stage-area'));
     await page.getByRole('switch', { name: 'Wireframe' }).click();
     await settled(page);
     assert.ok(
-      (await difference(browser, drawn, await page.locator('.stage-area').screenshot())) > 0.005,
+      (await difference(browser, drawn, await shot(page.locator('.stage-area')))) > 0.005,
       `${view}: the wireframe is gone`,
     );
   }
@@ -145,12 +142,12 @@ test('a reload and the URL alone restore the same state', async () => {
   await until(() => /t=0\.250/.test(first.page.url()), 'the URL holds the time');
   await hideToasts(first.page);
   await settled(first.page);
-  const before = await first.page.locator('.pane').screenshot();
+  const before = await shot(first.page.locator('.pane'));
   await first.page.reload();
   await until(() => button(first.page, 'Play').count(), 'the morph is back');
   await settled(first.page);
   await until(
-    async () => (await difference(browser, before, await first.page.locator('.pane').screenshot())) < 0.002,
+    async () => (await difference(browser, before, await shot(first.page.locator('.pane')))) < 0.002,
     'it looks the same',
   );
   const address = first.page.url();
@@ -292,8 +289,8 @@ test('the offered commands and pages show this morph', async () => {
   await other.locator('canvas').waitFor();
   const ground = (r, g, b) => Math.abs(r - 0xf3) + Math.abs(g - 0xf1) + Math.abs(b - 0xec) > 60 && r + g + b > 60;
   await until(async () => (await countPixels(other, 'canvas', ground)) > 2000, 'the morph appears');
-  const first = await other.screenshot();
-  await until(async () => (await difference(browser, first, await other.screenshot())) > 0.01, 'and moves');
+  const first = await shot(other);
+  await until(async () => (await difference(browser, first, await shot(other))) > 0.01, 'and moves');
   assert.deepEqual(faults, []);
   await context.close();
   assert.match(await text('model-viewer'), /<model-viewer src="dog-giraffe\.glb"/);
@@ -334,7 +331,7 @@ test('my own mesh is kept, its holes are open again, and each of several targets
   for (const chosen of [0, 1, 2]) {
     for (const i of [0, 1, 2]) await slide(shares.nth(i), Number(i === chosen));
     await settled(page);
-    pictures.push(await page.locator('.pane').screenshot());
+    pictures.push(await shot(page.locator('.pane')));
   }
   for (const [a, b] of [
     [0, 1],

@@ -188,12 +188,13 @@ export async function restore() {
     const ids = (query.get('m') ?? '').split(',').filter((id) => /^[0-9a-f]{64}$/.test(id));
     const result = query.get('r');
     const tab = query.get('tab') as Tab;
+    let lost = 0;
     if (ids.length) {
       set({ loading: 'Loading the shapes' });
       const meshes = await Promise.allSettled(ids.map((id) => client.getMesh(id)));
       await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
       set({ loading: null });
-      const lost = meshes.filter((m) => m.status === 'rejected').length;
+      lost = meshes.filter((m) => m.status === 'rejected').length;
       if (!lost) restoreTaken(query.get('x') ?? '');
       if (lost === ids.length) dead(`its ${lost > 1 ? `${lost} shapes are` : 'shape is'}`);
       else if (lost)
@@ -225,7 +226,7 @@ export async function restore() {
       const look = Number(query.get('look')) || 0;
       const extras = (query.get('e') ?? '').split(',').flatMap((text) => (text ? [Number(text) || 0] : []));
       if (supermesh) await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown, look, extras });
-      else if (!state.problem)
+      else if (!lost)
         set({
           problem: {
             title: 'The morph of this link is gone',

@@ -1,12 +1,13 @@
 /** The small pieces of the interface. */
 import type { ComponentChildren, JSX } from 'preact';
-import { useEffect, useState } from 'preact/hooks';
+import { useLayoutEffect, useState } from 'preact/hooks';
 import { watch } from '../state';
 
 /** Renders the component whenever the state changes. */
 export function useStateOfPage() {
   const [, tick] = useState(0);
-  useEffect(() => watch(() => tick((n) => n + 1)), []);
+  // At once, not after the next frame: a change before that would not be drawn.
+  useLayoutEffect(() => watch(() => tick((n) => n + 1)), []);
 }
 
 const PATHS: Record<string, string> = {

@@ -1,0 +1,13 @@
+// The browser of the tests: Debian's chromium-headless-shell, or its chromium where that is missing. Both draw pages with
+// the same code. The shell has no address bar, icons and menus to draw, so the tests take two thirds of the CPU time.
+import { existsSync } from 'node:fs';
+
+const shell = '/usr/bin/chromium-headless-shell';
+
+/** What visitors have, for benchmarks. */
+export const wholeBrowser = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
+
+export const executablePath = process.env.ORB_CHROMIUM ?? (existsSync(shell) ? shell : wholeBrowser);
+
+/** WebGL in software, for machines with and without a GPU. */
+export const softwareGl = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
