@@ -348,6 +348,7 @@ test('only the operator sees what was made without tokens', async (t) => {
     },
   });
   const [ann, admin] = [await add('ann', 'read,write'), await add('root', 'admin')];
+  if (process.env.ORB_NODES) for (const who of [ann, admin]) await d.known(who);
   for (const thing of [url, resource.url]) {
     assertProblem(await d.get(thing, ann), 404, 'not-found');
     assert.equal((await d.get(thing, admin)).status, 200);
