@@ -55,7 +55,9 @@ export async function s3Proxy(t, url, decide) {
     }
     const { hostname, port } = new URL(url);
     // The headers as they came: the signature is over them.
-    const to = http.request({ hostname, port, method: request.method, path: request.url, headers: request.headers });
+    // A connection of its own: the server may close a kept one just as it is used again.
+    const { method, url: target, headers } = request;
+    const to = http.request({ hostname, port, method, path: target, headers, agent: false });
     request.pipe(to);
     to.on('error', () => response.destroy());
     to.on('response', async (from) => {
