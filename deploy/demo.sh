@@ -76,12 +76,12 @@ build() {
   [ -f "$root/build/build.ninja" ] || cmake -S "$root" --preset release -DORB_TESTS=OFF
   cmake --build "$root/build" --target orbmorphd orbmorph
 }
-# What the build does, every five seconds: Ninja writes [done/all] before each step.
+# What the build does, every five seconds: Ninja writes [done/all] before each step, build.sh "stage: …".
 say_progress() {
   local step
   while sleep 5; do
-    step=$(grep -aoE '^\[[0-9]+/[0-9]+\]' "$log" | tail -n 1 | tr -d '[]') || true
-    [ -n "$step" ] || step='preparing'
+    step=$(grep -aoE '^(\[[0-9]+/[0-9]+\]|stage: .*)' "$log" | tail -n 1 | sed 's/^stage: //' | tr -d '[]') || true
+    [ -n "$step" ] || step='what the compiler can do'
     echo "  building: ${step/\// of } (${SECONDS} s)"
   done
 }

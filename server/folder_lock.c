@@ -28,7 +28,8 @@ int folder_lock(const char *folder) {
 int folder_lock_data(const char *data) {
   char path[PATH_MAX];
   if (mkdir(data, 0700) != 0 && errno != EEXIST) {
-    log_error("the folder %s cannot be created: %s", data, strerror(errno));
+    log_error("the folder %s cannot be created: %s", data,
+              errno == ENOENT ? "the folder that it is to be in does not exist" : strerror(errno));
     return FOLDER_LOCK_TOLD;
   }
   snprintf(path, sizeof path, "%s/lock", data);

@@ -27,7 +27,7 @@ step_packages() {
   orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}" "${orb_fuzz_packages[@]}"
   orb_install_node
   if ! cmp -s tests/package-lock.json tests/node_modules/.installed-lock; then
-    (cd tests && npm ci --no-audit --no-fund --loglevel=error)
+    (cd tests && npm ci --prefer-offline --no-audit --no-fund --loglevel=error)
     cp tests/package-lock.json tests/node_modules/.installed-lock
   fi
 }

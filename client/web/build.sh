@@ -10,8 +10,11 @@ if [ -f "$stamp" ] && [ -z "$(find src public welcome index.html package-lock.js
 fi
 command -v npm >/dev/null || { echo "The studio needs Node 18 and npm: apt-get install nodejs npm" >&2; exit 1; }
 if [ ! -f node_modules/.installed ] || [ package-lock.json -nt node_modules/.installed ]; then
-  npm ci --no-audit --no-fund --loglevel=error
+  echo 'stage: the packages of the studio'
+  # packages that npm has kept are not asked for again: without a network, each question would wait for minutes
+  npm ci --prefer-offline --no-audit --no-fund --loglevel=error
   touch node_modules/.installed
 fi
+echo 'stage: the studio'
 npx --no-install vite build --logLevel warn
 touch "$stamp"

@@ -149,7 +149,10 @@ static int listen_internet(const char *where, listener *out) {
   setsockopt(out->fd, SOL_SOCKET, SO_REUSEADDR, &(int){1}, sizeof(int));
   int fine = out->fd >= 0 && bind(out->fd, found->ai_addr, found->ai_addrlen) == 0 && listen(out->fd, SOMAXCONN) == 0;
   if (!fine) {
-    log_error("cannot listen on %s: %s", where, strerror(errno));
+    log_error("cannot listen on %s: %s%s", where, strerror(errno),
+              errno == EADDRINUSE ? "; another program has this port, maybe another orbmorphd: stop it, or choose "
+                                    "another port with --listen"
+                                  : "");
   }
   freeaddrinfo(found);
   snprintf(host, sizeof host, "%.*s", (int)(colon - where), where);

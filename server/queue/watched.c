@@ -131,7 +131,7 @@ static int compare(queue *q, const compared *was, const job_mark *mark) {
   pthread_mutex_lock(&q->lock);
   job *j = table_with_id(q, was->id);
   if (j && was->here && j->taken && j->running && j->row.attempt == was->attempt) {
-    int lost = mark->state != API_JOB_RUNNING || mark->attempt != was->attempt;
+    int lost = mark->queued || api_job_ended((api_job_state)mark->state) || mark->attempt != was->attempt;
     if (lost && j->ctx) {
       log_warn("job %s, attempt %d: this node was silent beyond its lease and has lost it", was->id, was->attempt);
     }

@@ -27,8 +27,11 @@ typedef struct row_kind {
   "iif(" kind "=3, substr(" json ", 1, instr(" json ", ',\"landmarks\":')-1)||'}', " json ")"
 /* Of a job: these columns. */
 #define JOB_COLUMNS JOB_COLUMNS_WITH("state")
-/* As callers see it, where several nodes share the jobs: one that waits for jobs runs when they do. */
-#define JOB_COLUMNS_SHOWN JOB_COLUMNS_WITH("CASE WHEN state=0 AND waits>0 AND started>0 THEN 1 ELSE state END")
+/* As callers see it, where several nodes share the jobs: one that waits for jobs runs when they do, and one that a node
+ * has claimed, only to see which jobs it must wait for, does not run yet. */
+#define JOB_STATE_SHOWN \
+  "CASE WHEN state=0 AND waits>0 AND started>0 THEN 1 WHEN state=1 AND started=0 THEN 0 ELSE state END"
+#define JOB_COLUMNS_SHOWN JOB_COLUMNS_WITH(JOB_STATE_SHOWN)
 #define JOB_COLUMNS_WITH(state)                                                          \
   "seq, id, key, kind, " state                                                           \
   ", attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \

@@ -52,7 +52,7 @@ static const char pick_fetching[] = PICK("true", FIRST("kind=2"));
 /* Another claim of the same moment skips the row, where the lock of transactions did not keep it waiting. */
 static const char take[] =
     "UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(), alone=suspect,"
-    " started=CASE started WHEN 0 THEN clock_ms() ELSE started END"
+    " started=CASE WHEN started=0 AND kind<>1 THEN clock_ms() ELSE started END" /* 1: catalogue_job_begin() */
     " WHERE id=(SELECT id FROM job WHERE id=?1 AND state=0 FOR UPDATE SKIP LOCKED LIMIT 1)";
 
 /* Jobs that wait for this one are shown as running from now on. */
@@ -281,8 +281,9 @@ static int wait_for(database *db, void *arg) {
                                          "UPDATE job SET state=0, attempt=attempt-1, alone=0,"
                                          " waits=(SELECT count(*) FROM need WHERE need.job=?1),"
                                          " started=CASE WHEN EXISTS(SELECT 1 FROM need n JOIN job e ON e.key=n.key"
-                                         " AND e.owner=n.owner WHERE n.job=?1 AND e.state=1) OR job.attempt>1"
-                                         " THEN job.started ELSE 0 END"
+                                         " AND e.owner=n.owner WHERE n.job=?1 AND e.state=1)"
+                                         " THEN CASE job.started WHEN 0 THEN clock_ms() ELSE job.started END"
+                                         " WHEN job.attempt>1 THEN job.started ELSE 0 END"
                                          " WHERE id=?1 AND state=1 AND attempt=?2 AND cancel=0",
                                          n->row->id, n->row->attempt)
                         : code;
@@ -290,6 +291,24 @@ static int wait_for(database *db, void *arg) {
 
 store_result catalogue_job_wait(catalogue *cat, const job_needs *needs) {
   return catalogue_write(cat, wait_for, (void *)(uintptr_t)needs);
+}
+
+static int begin(database *db, void *arg) {
+  const job_row *r = arg;
+  sql_statement *st =
+      database_statement(db, "UPDATE job SET started=clock_ms() WHERE id=?1 AND state=1 AND attempt=?2 AND started=0");
+  if (!st) {
+    return SQL_ERROR;
+  }
+  sql_bind_text(st, 1, r->id);
+  sql_bind_integer(st, 2, r->attempt);
+  return database_run(db, st);
+}
+
+store_result catalogue_job_begin(catalogue *cat, const char *id, int attempt) {
+  job_row row = {.attempt = attempt};
+  snprintf(row.id, sizeof row.id, "%s", id);
+  return catalogue_write(cat, begin, &row);
 }
 
 static int release_big(database *db, void *arg) {
@@ -329,10 +348,10 @@ static const row_kind mark_rows = {read_mark, NULL, sizeof(job_mark)};
 int catalogue_job_marks(catalogue *cat, const char *ids, int limit, job_mark *out) {
   database *db = catalogue_reader(cat);
   sql_statement *st = database_statement(
-      db,
-      "SELECT id, CASE WHEN state=0 AND waits>0 AND started>0 THEN 1 ELSE state END, attempt,"
-      " cancel, (SELECT coalesce(max(number), 0) FROM event e"
-      " WHERE e.job=job.id), (state=0)::int FROM job WHERE id=ANY(string_to_array(?1, ',')) LIMIT ?2");
+      db, "SELECT id, " JOB_STATE_SHOWN
+          ", attempt,"
+          " cancel, (SELECT coalesce(max(number), 0) FROM event e"
+          " WHERE e.job=job.id), (state=0)::int FROM job WHERE id=ANY(string_to_array(?1, ',')) LIMIT ?2");
   if (st) {
     sql_bind_text(st, 1, ids);
     sql_bind_integer(st, 2, limit);

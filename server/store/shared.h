@@ -58,6 +58,8 @@ typedef struct job_needs {
   int64_t now;
 } job_needs;
 store_result catalogue_job_wait(catalogue *cat, const job_needs *needs);
+/* Shows a claimed supermesh as running, which catalogue_claim_next() does for other jobs. */
+store_result catalogue_job_begin(catalogue *cat, const char *id, int attempt);
 /* Like catalogue_job_release(), and the job needs all memory of a node from now on. */
 store_result catalogue_job_release_big(catalogue *cat, const char *id, int attempt);
 /* Marks a job as to be cancelled, and notifies the node that runs it. */

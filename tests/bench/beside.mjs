@@ -67,7 +67,8 @@ const uploads = (n, times) => ({
   },
 });
 const wrk = (url) => {
-  const { stdout } = spawnSync('wrk', ['-t2', '-c32', '-d2', url], { encoding: 'utf8' });
+  const { stdout, error } = spawnSync('wrk', ['-t2', '-c32', '-d2', url], { encoding: 'utf8' });
+  if (error) throw new Error(`wrk cannot be run (Debian package wrk): ${error.message}`);
   return Number(/(\d+) requests in/.exec(stdout)[1]);
 };
 const kinds = {

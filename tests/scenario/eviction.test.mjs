@@ -98,7 +98,10 @@ test('a derived object that is evicted while a job needs it is computed again', 
   await d.start();
 });
 
-test('--gc removes derived objects beyond the budget and what no row names, and nothing else', async (t) => {
+// Beside nodes --gc may run, and objects are in the bucket: scenario.s3.
+const one = { skip: process.env.ORB_NODES && 'the test looks at the files of one data folder' };
+
+test('--gc removes derived objects beyond the budget and what no row names, and nothing else', one, async (t) => {
   // Each use is noted where there is a budget, far off as it may be.
   const d = await daemon(t, { args: ['--derived-bytes', '1G'] });
   const gc = (...args) => promisify(execFile)(binaries.daemon, ['--gc', '--data', d.data, ...args]);

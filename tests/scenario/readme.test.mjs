@@ -12,7 +12,9 @@ import { morphOf, parseGlb } from './support/glb.mjs';
 /** What a document's lines must have left behind, and said. */
 const expected = {
   'README.md': async (at, out) => {
-    assert.equal((await readFile(path.join(at, 'dog-giraffe.glb'))).toString('latin1', 0, 4), 'glTF');
+    for (const name of ['morph.glb', 'dog-giraffe.glb'])
+      assert.deepEqual(morphOf(await readFile(path.join(at, name))).names, ['giraffe']);
+    assert.match(out, /giraffe\.off: healthy: closed/);
     assert.match(out, /glTF/);
     assert.match(out, /^event: ?succeeded/m);
   },

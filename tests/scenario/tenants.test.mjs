@@ -307,12 +307,20 @@ test('deleting removes only the tenant that deletes from the owners', async (t) 
   assertProblem(await d.get(url, admin), 404, 'not-found');
   assert.equal((await d.get(made[1], bob)).status, 200, 'what was derived stays');
 
+  // Of several nodes each hears of a new quota by a notice.
+  const accepted = async (who) => {
+    let reply = await upload(who, large);
+    if (process.env.ORB_NODES)
+      await until(async () => reply.status !== 429 || !(reply = await upload(who, large)), 'a node knows the quota');
+    return reply.json;
+  };
+
   // A job that needs it stands in the way, but only to the one whose job it is.
   await upload(ann, large);
   await token('set', 'bob', '--quota', '0');
-  const { url: big, id: mesh } = (await upload(bob, large)).json;
+  const { url: big, id: mesh } = await accepted(bob);
   await token('set', 'ann', '--quota', '0');
-  const hers = (await upload(ann, large)).json;
+  const hers = await accepted(ann);
   assert.equal(hers.id, mesh);
   const job = (await d.post('/v1/embeddings', { mesh, ...endless }, bob)).json;
   assertProblem(await d.delete(big, bob), 409, 'in-use');
@@ -348,6 +356,7 @@ test('only the operator sees what was made without tokens', async (t) => {
     },
   });
   const [ann, admin] = [await add('ann', 'read,write'), await add('root', 'admin')];
+  if (process.env.ORB_NODES) for (const who of [ann, admin]) await d.known(who);
   for (const thing of [url, resource.url]) {
     assertProblem(await d.get(thing, ann), 404, 'not-found');
     assert.equal((await d.get(thing, admin)).status, 200);

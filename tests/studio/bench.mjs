@@ -11,7 +11,7 @@ import { extname, join } from 'node:path';
 import { glb, icosphere, objFiles } from './bench/shapes.mjs';
 import { traced } from './bench/tasks.mjs';
 import { wholeBrowser } from '../tools/chromium.mjs';
-import { root, startBrowser, until } from './support.mjs';
+import { counted, root, startBrowser, until } from './support.mjs';
 
 const level = Number(process.argv.slice(2).find((a) => /^\d+$/.test(a)) ?? 7);
 const compositing = process.argv.includes('--software-compositing') ? 'software' : 'gpu';

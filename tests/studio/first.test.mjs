@@ -2,7 +2,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { browser, daemon } from './started.mjs';
-import { addFiles, button, defaultShown, openPage, sample, shownToasts, until } from './support.mjs';
+import { addFiles, button, defaultShown, openPage, sample, settled, shownToasts, until } from './support.mjs';
 
 const isFast = (request) => request.postDataJSON().align?.options?.preset === 'fast';
 const refuse = (route, title) =>
@@ -182,5 +182,26 @@ test('progress names the morph and its stage', async () => {
     seen.some((text) => /^Default morph: \S/.test(text)),
     seen.join(', '),
   );
+  await done();
+});
+
+test('progress draws no shape again: without a GPU that takes a core from the daemon', async () => {
+  const { opened, open } = gate();
+  const { page, done } = await pageWith(async (_kind, route) => {
+    await opened;
+    await route.continue();
+  });
+  await settled(page);
+  await page.evaluate(() => {
+    globalThis.drawings = 0;
+    document.querySelector('.stage').addEventListener('drawn', () => globalThis.drawings++);
+  });
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(async () => /^0:0[2-9]/.test(await page.locator('.progress .hint').first().innerText()), 'two seconds');
+  assert.equal(await page.evaluate(() => globalThis.drawings), 0);
+  open();
+  await until(() => button(page, 'Pause').count(), 'the fast morph plays');
+  assert.ok((await page.evaluate(() => globalThis.drawings)) > 0);
+  await defaultShown(page);
   await done();
 });

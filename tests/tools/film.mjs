@@ -32,14 +32,14 @@ const film = await page.evaluate(
     const canvas = new OffscreenCanvas(width, height);
     const camera = { yaw: 0.55, distance: 2.75 };
     const tints = ['#f2a97f', '#f0c64f', '#8fb2ef'];
-    const player = await studio.open(canvas, glb, { shapes: 3, tints, seconds: 1.8, loop: 'loop', camera });
+    const player = await globalThis.studio.open(canvas, glb, { shapes: 3, tints, seconds: 1.8, loop: 'loop', camera });
     const stills = [];
     for (let i = 0; i < frames; i++) {
       player.draw(player.placeAt((i * player.seconds) / frames), '#171a21');
       const still = await canvas.convertToBlob({ type: 'image/webp', quality: 0.86 });
       stills.push(new Uint8Array(await still.arrayBuffer()));
     }
-    const whole = studio.joinWebp(stills, width, height, Math.round((1000 * player.seconds) / frames));
+    const whole = globalThis.studio.joinWebp(stills, width, height, Math.round((1000 * player.seconds) / frames));
     const bytes = new Uint8Array(await whole.arrayBuffer());
     return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(''));
   },

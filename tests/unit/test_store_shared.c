@@ -349,6 +349,29 @@ static void test_needs(void **state) {
   assert_int_equal(whole.row.attempt, 1);
 }
 
+/* A supermesh is claimed to see what it lacks: callers see it run once it has begun, or once what it lacks runs. */
+static void test_begin(void **state) {
+  nodes *n = *state;
+  job_row row = {.kind = API_JOB_SUPERMESH, .listed = 1, .cost = 12, .created = 1, .owner = "ann"};
+  job_claim whole;
+  job_mark mark;
+  row.request = (char *)(uintptr_t) "{}";
+  fill(row.key, '1');
+  api_random_id(row.id);
+  job_submission s = {.row = &row, .limit = 100};
+  assert_int_equal(catalogue_job_submit(n->cat[0], &s), STORE_OK);
+  claim_key(n, 0, '1', &whole);
+  assert_false(is_waiting(n, row.id, &mark));
+  assert_int_equal(mark.state, API_JOB_QUEUED);
+  assert_int_equal(whole.row.started, 0);
+  assert_int_equal(catalogue_job_begin(n->cat[0], row.id, whole.row.attempt + 1), STORE_OK); /* another claim's */
+  assert_false(is_waiting(n, row.id, &mark));
+  assert_int_equal(mark.state, API_JOB_QUEUED);
+  assert_int_equal(catalogue_job_begin(n->cat[0], row.id, whole.row.attempt), STORE_OK);
+  assert_false(is_waiting(n, row.id, &mark));
+  assert_int_equal(mark.state, API_JOB_RUNNING);
+}
+
 /* Cancelling a job that waits also cancels the jobs that it alone needs. */
 static void test_cancel(void **state) {
   nodes *n = *state;
@@ -581,6 +604,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_crashes, setup, teardown),
       cmocka_unit_test_setup_teardown(test_own_last_life, setup, teardown),
       cmocka_unit_test_setup_teardown(test_needs, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_begin, setup, teardown),
       cmocka_unit_test_setup_teardown(test_cancel, setup, teardown),
       cmocka_unit_test_setup_teardown(test_notices, setup, teardown),
       cmocka_unit_test_setup_teardown(test_publishing, setup, teardown),

@@ -3,7 +3,13 @@ import type { Order, Report } from './messages';
 
 const worker = new Worker(new URL('./draw.worker.ts', import.meta.url), { type: 'module' });
 
+let changes = 0;
+
+/** How many orders so far have changed what a drawing shows. */
+export const changesOrdered = () => changes;
+
 export function order(what: Order, transfer: Transferable[] = []) {
+  if (what.op !== 'draw') changes++;
   worker.postMessage(what, transfer);
 }
 

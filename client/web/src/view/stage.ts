@@ -4,7 +4,7 @@
  * drawing before the last one is done. Views that share an Orbit are linked.
  */
 import { Orbit, project, rayThrough, type Look } from './camera';
-import { onReport, order } from './link';
+import { changesOrdered, onReport, order } from './link';
 import type { Frame } from './messages';
 import type { Model } from './models';
 
@@ -75,6 +75,10 @@ export class Stage {
   private scheduled = false;
   private drawing = false;
   private again = false;
+  /** What the last drawing shows; a drawing that would show the same is left out. */
+  private shown = '';
+  /** whether the page has yet to show the last drawing */
+  private unseen = false;
   private readonly observer = new ResizeObserver(() => this.draw());
   private readonly soon = new MessageChannel();
 
@@ -84,9 +88,9 @@ export class Stage {
     this.soon.port1.onmessage = () => this.paint();
     onReport((report) => {
       if (report.op === 'started' && !report.works) this.fail();
-      else if (report.op === 'restored') this.draw();
+      else if (report.op === 'restored') this.redraw();
       else if (report.op === 'drawn') this.drawn();
-      else if (report.op === 'shown' && !this.drawing && !this.scheduled) delete this.host.dataset.busy;
+      else if (report.op === 'shown' && !this.drawing) this.seen();
     });
     try {
       const canvas = this.canvas.transferControlToOffscreen();
@@ -127,6 +131,12 @@ export class Stage {
     }
   }
 
+  /** Draws even if nothing has changed: the canvas is empty. */
+  private redraw() {
+    this.shown = '';
+    this.draw();
+  }
+
   moved() {
     this.draw();
     this.onMoved?.();
@@ -152,8 +162,19 @@ export class Stage {
           look,
         });
     }
-    this.drawing = true;
+    const now = JSON.stringify([whole.width, whole.height, frames, changesOrdered()]);
+    if (now === this.shown) {
+      if (!this.unseen) delete this.host.dataset.busy;
+      return;
+    }
+    this.shown = now;
+    this.drawing = this.unseen = true;
     order({ op: 'draw', width: whole.width, height: whole.height, frames });
+  }
+
+  private seen() {
+    this.unseen = false;
+    if (!this.scheduled) delete this.host.dataset.busy;
   }
 
   /** Tests use the event and data-busy to measure and to take pictures; nothing else depends on them. */
