@@ -435,7 +435,7 @@ end:
 /* What a slide needs beside what a registration has. */
 static orb_status prepare_slide(registration *r, orb_stretch *stretch) {
   const size_t n = 3 * (size_t)r->a.count;
-  ORB_TRY(orb_stretch_create(r->ctx, r->a.count, stretch));
+  ORB_TRY(orb_stretch_create(r->ctx, &r->a, stretch));
   r->stretch = stretch;
   r->ahead = ORB_NEW(r->ctx, double, n);
   r->last = ORB_NEW(r->ctx, double, n);

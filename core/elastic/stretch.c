@@ -11,7 +11,6 @@
 #include "numeric/vec3.h"
 
 enum {
-  MOMENTS = 18,     /* of a vertex: those of q with p, then those of p with itself */
   GRAIN = 128,      /* vertices of one task */
   ROUND_EACH = 600, /* vertices of a mesh for each round of smoothing, which then reaches a tenth of the girth of a body
                        at any resolution. Four times as much is as good */
@@ -27,27 +26,35 @@ typedef struct fitting {
   orb_stretch *stretch;
 } fitting;
 
-orb_status orb_stretch_create(orb_context *ctx, int32_t count, orb_stretch *out) {
-  out->linear = ORB_NEW(ctx, double, 9 * (size_t)count);
-  out->moment = ORB_NEW(ctx, double, MOMENTS *(size_t)count);
-  out->next = ORB_NEW(ctx, double, MOMENTS *(size_t)count);
-  return out->linear && out->moment && out->next ? ORB_OK : ORB_E_NO_MEMORY;
-}
-
 void orb_stretch_free(orb_context *ctx, orb_stretch *stretch) {
   orb_free(ctx, stretch->linear);
+  orb_free(ctx, stretch->given);
   orb_free(ctx, stretch->moment);
   orb_free(ctx, stretch->next);
 }
 
-static void gather_range(void *arg, int64_t begin, int64_t end, int thread) {
+static void gather_given(void *arg, int64_t begin, int64_t end, int thread) {
   const fitting *f = arg;
   const orb_body *body = f->body;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
-    double *m = f->stretch->moment + MOMENTS * v;
+    double *m = f->stretch->moment + 9 * v, p[3];
+    memset(m, 0, sizeof(double[9]));
+    for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
+      orb_sub(body->mesh->positions + 3 * (size_t)body->next[i], body->mesh->positions + 3 * v, p);
+      orb_add_outer(m, p, p, body->weight[i]);
+    }
+  }
+}
+
+static void gather_now(void *arg, int64_t begin, int64_t end, int thread) {
+  const fitting *f = arg;
+  const orb_body *body = f->body;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    double *m = f->stretch->moment + 9 * v;
     const double *r = f->rotation + 9 * v;
-    memset(m, 0, MOMENTS * sizeof *m);
+    memset(m, 0, sizeof(double[9]));
     for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
       double p[3], now[3], q[3];
       orb_sub(body->mesh->positions + 3 * (size_t)body->next[i], body->mesh->positions + 3 * v, p);
@@ -56,7 +63,6 @@ static void gather_range(void *arg, int64_t begin, int64_t end, int thread) {
         q[k] = r[k] * now[0] + r[3 + k] * now[1] + r[6 + k] * now[2];
       }
       orb_add_outer(m, q, p, body->weight[i]);
-      orb_add_outer(m + 9, p, p, body->weight[i]);
     }
   }
 }
@@ -68,18 +74,18 @@ static void smooth_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
     const double *m = f->stretch->moment;
-    double all = body->mass[v], *sum = f->stretch->next + MOMENTS * v;
-    for (int k = 0; k < MOMENTS; k++) {
-      sum[k] = all * m[MOMENTS * v + k];
+    double all = body->mass[v], *sum = f->stretch->next + 9 * v;
+    for (int k = 0; k < 9; k++) {
+      sum[k] = all * m[9 * v + k];
     }
     for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
       const double mass = body->mass[body->next[i]];
       all += mass;
-      for (int k = 0; k < MOMENTS; k++) {
-        sum[k] += mass * m[MOMENTS * (int64_t)body->next[i] + k];
+      for (int k = 0; k < 9; k++) {
+        sum[k] += mass * m[9 * (int64_t)body->next[i] + k];
       }
     }
-    for (int k = 0; k < MOMENTS; k++) {
+    for (int k = 0; k < 9; k++) {
       sum[k] /= all;
     }
   }
@@ -108,14 +114,17 @@ static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
   const fitting *f = arg;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
-    double *m = f->stretch->moment + MOMENTS * v, *linear = f->stretch->linear + 9 * v, stretched[9];
-    const double *r = f->rotation + 9 * v, given = MEAN_SHARE * (m[9] + m[13] + m[17]),
-                 now = MEAN_SHARE * (m[0] + m[4] + m[8]);
+    double now[9], given[9], stretched[9], *linear = f->stretch->linear + 9 * v;
+    const double *r = f->rotation + 9 * v;
+    memcpy(now, f->stretch->moment + 9 * v, sizeof now);
+    memcpy(given, f->stretch->given + 9 * v, sizeof given);
+    const double mean_now = MEAN_SHARE * (now[0] + now[4] + now[8]),
+                 mean_given = MEAN_SHARE * (given[0] + given[4] + given[8]);
     for (int k = 0; k < 9; k += 4) {
-      m[k] += now;
-      m[9 + k] += given;
+      now[k] += mean_now;
+      given[k] += mean_given;
     }
-    if (!divide(m, m + 9, stretched)) {
+    if (!divide(now, given, stretched)) {
       memcpy(linear, r, sizeof(double[9]));
       continue;
     }
@@ -128,18 +137,40 @@ static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
+/* Smooths the moments. */
+static void smooth(orb_context *ctx, fitting *f) {
+  const int32_t count = f->body->count, wanted = count / ROUND_EACH,
+                rounds = wanted < ROUNDS_LEAST  ? ROUNDS_LEAST
+                         : wanted > ROUNDS_MOST ? ROUNDS_MOST
+                                                : wanted;
+  for (int32_t i = 0; i < rounds; i++) {
+    orb_parallel_for(ctx, count, GRAIN, smooth_range, f);
+    double *moment = f->stretch->moment;
+    f->stretch->moment = f->stretch->next;
+    f->stretch->next = moment;
+  }
+}
+
+orb_status orb_stretch_create(orb_context *ctx, const orb_body *body, orb_stretch *out) {
+  const size_t n = 9 * (size_t)body->count;
+  fitting f = {.body = body, .stretch = out};
+  out->linear = ORB_NEW(ctx, double, n);
+  out->given = ORB_NEW(ctx, double, n);
+  out->moment = ORB_NEW(ctx, double, n);
+  out->next = ORB_NEW(ctx, double, n);
+  if (!out->linear || !out->given || !out->moment || !out->next) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_parallel_for(ctx, body->count, GRAIN, gather_given, &f);
+  smooth(ctx, &f);
+  memcpy(out->given, out->moment, n * sizeof *out->given);
+  return ORB_OK;
+}
+
 void orb_stretch_fit(orb_context *ctx, const orb_body *body, const double *position, const double *rotation,
                      orb_stretch *stretch) {
   fitting f = {body, position, rotation, stretch};
-  const int32_t wanted = body->count / ROUND_EACH, rounds = wanted < ROUNDS_LEAST  ? ROUNDS_LEAST
-                                                            : wanted > ROUNDS_MOST ? ROUNDS_MOST
-                                                                                   : wanted;
-  orb_parallel_for(ctx, body->count, GRAIN, gather_range, &f);
-  for (int32_t i = 0; i < rounds; i++) {
-    orb_parallel_for(ctx, body->count, GRAIN, smooth_range, &f);
-    double *moment = stretch->moment;
-    stretch->moment = stretch->next;
-    stretch->next = moment;
-  }
+  orb_parallel_for(ctx, body->count, GRAIN, gather_now, &f);
+  smooth(ctx, &f);
   orb_parallel_for(ctx, body->count, GRAIN, fit_range, &f);
 }

@@ -6,11 +6,12 @@
 
 typedef struct orb_stretch {
   double *linear;        /* 9 a vertex, row-major: what the pose makes of its surroundings, rotated and stretched */
-  double *moment, *next; /* 18 a vertex */
+  double *given;         /* smoothed moments of the edges as given; 9 a vertex */
+  double *moment, *next; /* of the edges now with those; 9 a vertex */
 } orb_stretch;
 
-/* Room for as many vertices. Free `out` in any case. */
-ORB_MUST_CHECK orb_status orb_stretch_create(orb_context *ctx, int32_t count, orb_stretch *out);
+/* For the vertices of a body. Free `out` in any case. As orb_stretch_fit(). */
+ORB_MUST_CHECK orb_status orb_stretch_create(orb_context *ctx, const orb_body *body, orb_stretch *out);
 void orb_stretch_free(orb_context *ctx, orb_stretch *stretch);
 
 /* Fits stretch->linear to a body at these positions (3 a vertex), whose vertices have rotated so far (9 each).
