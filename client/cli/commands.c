@@ -1,4 +1,4 @@
-/* upload, embed, job, ls, get, rm. */
+/* upload, embed, job, usage, ls, get, rm. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -4,7 +4,8 @@
 
 #include "http.h"
 
-/* Whether a text is the beginning of an id: 4 to 63 hexadecimal digits, but not 32, which are the id of a job. */
+/* Whether a text is the beginning of an id: 4 to 63 hexadecimal digits in lower case, but not 32, which are the id of a
+ * job. */
 int cli_is_prefix(const char *text);
 
 /* Finds the only entry of these collections (a list that ends in NULL) whose id begins with the digits. *path: its

@@ -9,7 +9,7 @@
  *
  * Up is y, as glTF says, unless the first shape clearly lies down: it is a mirror image of itself along y and not along
  * x or z, or it stands on one spot along y and on separate feet along another axis. The yaw shows the largest side of
- * the shapes, rotated by a quarter of a right angle so that depth shows. */
+ * the shapes, rotated by 22° so that depth shows. */
 void view_aim(const view_mesh *mesh, view_options *options);
 
 #endif

@@ -13,7 +13,7 @@ orb_status orb_fail(orb_context *ctx, orb_status status, const char *format, ...
 orb_error *orb_context_error_edit(orb_context *ctx);
 void orb_error_clear(orb_context *ctx);
 
-/* A record without facts: counts 0, numbers that do not apply −1. */
+/* Clears a record: counts become 0, and numbers that need not apply become −1. */
 void orb_error_reset(orb_error *error);
 
 #endif

@@ -12,7 +12,7 @@
 /* Any thread. O(size). */
 uint64_t orb_hash(const orb_context *ctx, const void *bytes, size_t size);
 
-/* The same of any key: for orb_hash() and the test of its published values. */
+/* The same under any key: for orb_hash(), and for the test against its published values. */
 uint64_t orb_siphash13(const uint64_t key[2], const void *bytes, size_t size);
 
 /* A key from the operating system. */

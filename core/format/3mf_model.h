@@ -29,7 +29,7 @@ typedef struct orb_3mf_resource {
   int32_t part;
   orb_3mf_kind kind;
   int is_used;              /* by a component */
-  int32_t material;         /* of triangles that name none: in materials, −1: none */
+  int32_t material;         /* of triangles that name none: its index in materials; −1: none */
   int64_t vertex, triangle; /* the first ones */
   int64_t vertices, triangles;
   int64_t first, count; /* an object's components, a group's materials */
@@ -71,7 +71,7 @@ ORB_MUST_CHECK orb_status orb_3mf_add(orb_3mf_model *model, int32_t part, int64_
 /* NULL: there is none. */
 orb_3mf_resource *orb_3mf_find(const orb_3mf_model *model, int32_t part, int64_t id);
 
-/* Places what the build shows, or all objects that no other has as a component. */
+/* Places the items of the build; where it has none, all objects that no other has as a component. */
 ORB_MUST_CHECK orb_status orb_3mf_place(orb_3mf_model *model, orb_build *build);
 
 #endif

@@ -62,7 +62,7 @@ ORB_MUST_CHECK orb_status orb_build_color(orb_build *build, const double *rgba, 
 ORB_MUST_CHECK orb_status orb_build_normal(orb_build *build, const double normal[3]);
 ORB_MUST_CHECK orb_status orb_build_texcoord(orb_build *build, const double texcoord[2]);
 
-/* One more corner of the current face, then its end; where: line or offset, for messages. */
+/* The first adds a corner to the current face, the second ends the face. where: line or offset, for messages. */
 ORB_MUST_CHECK orb_status orb_build_corner(orb_build *build, orb_corner corner, int64_t where);
 ORB_MUST_CHECK orb_status orb_build_face_end(orb_build *build, int64_t corners);
 

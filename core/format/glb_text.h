@@ -20,7 +20,7 @@ void orb_glb_text(orb_glb_writer *w, const char *literal);
 
 /* Values. before: the text in front of the value, with its comma or bracket and its key. */
 void orb_glb_integer(orb_glb_writer *w, const char *before, size_t value);
-/* As few digits as read back as the same number; with a point in every locale. */
+/* Writes the fewest digits that read back as the same number, with a point in every locale. */
 void orb_glb_number(orb_glb_writer *w, const char *before, double value);
 void orb_glb_numbers(orb_glb_writer *w, const char *before, const double *values, int count);
 /* U+FFFD replaces bytes that are not UTF-8. */

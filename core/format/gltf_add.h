@@ -1,4 +1,5 @@
-/* A GLB with more: attributes of its vertices, a skin with its skeleton. Everything else stays as it is. */
+/* Adds to a GLB: attributes of its vertices, a skin with its skeleton, variants of its materials. Everything else stays
+ * as it is. */
 #ifndef ORB_FORMAT_GLTF_ADD_H
 #define ORB_FORMAT_GLTF_ADD_H
 
@@ -16,7 +17,7 @@ typedef struct orb_added_set {
   int32_t number;      /* the number that it got */
 } orb_added_set;
 
-/* Pictures of the base colour in the texture coordinates of the primitives. */
+/* A picture of the base colour in the texture coordinates of the primitives. */
 typedef struct orb_added_image {
   int32_t material; /* of the primitives that show it; −1: those without one */
   const unsigned char *png;
@@ -40,7 +41,7 @@ typedef struct orb_additions {
   orb_added_skin skin;
   int32_t variant_count;
   orb_added_variant *variants;
-  const char *own_name; /* of the variant with the materials that are there, which comes first */
+  const char *own_name; /* of the variant with the materials that the document has; it comes first */
   int whiten;           /* the colours of vertices are new, and the plain material must not tint them */
 } orb_additions;
 

@@ -8,9 +8,9 @@
 namespace gltf {
 
 /* The places of the joints, 3 numbers each, in the coordinates of the asset. rest: where they are on their own surface.
- * A joint follows the part of the surface that it and the joint above it share, and where there is none, all that it
- * moves: as the affine map that fits that part best. So an affine image of the surface has the affine image of the
- * joints. Joints that move no vertex get NaN. O(V + joints). */
+ * A joint follows the part of the surface that it and the joint above it share, or all that it moves where they share
+ * none. It moves by the affine map that fits that part best. So an affine image of the surface has the affine image of
+ * the joints. Joints that move no vertex get NaN. O(V + joints). */
 Numbers fit_joints(const Skeleton &skeleton, const orb_skin_surface &surface, const Numbers &rest);
 
 }  // namespace gltf

@@ -16,7 +16,7 @@ typedef struct orb_given_file {
   const unsigned char *used; /* vertex_count */
 } orb_given_file;
 
-enum { ORB_GIVEN_SETS = 8 }; /* of colours, of texture coordinates: the sets beyond are left */
+enum { ORB_GIVEN_SETS = 8 }; /* of colours, of texture coordinates: sets of higher numbers are not read */
 
 /* Sets of colours (4 numbers a vertex; white where a primitive has none) or texture coordinates (2; zeros). A set
  * counts if a vertex that counts has it. */

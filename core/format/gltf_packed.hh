@@ -16,7 +16,7 @@ inline constexpr char MESHOPT[] = "EXT_meshopt_compression", DRACO[] = "KHR_drac
 /* The largest value of a component, which a normalized one calls 1; 1 for floats. */
 double component_most(int64_t type);
 
-/* Of integers of 16 bits, once they are shares of their largest value as 32-bit floats. */
+/* Bounds the rounding of an integer of 16 bits whose share of the largest value has been a 32-bit float. */
 const double SHARE_ERROR = 1.0 / 64;
 
 class Packed {

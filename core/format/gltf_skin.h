@@ -10,7 +10,7 @@
 typedef struct orb_skin_surface {
   int32_t count;                /* of its vertices; 0: the skeleton stays as it is */
   const double *before, *after; /* 3 a vertex: on the shape, on the base */
-  const double *area;           /* of the base, that each vertex stands for */
+  const double *area;           /* of each vertex: the area of the base that it stands for */
   const uint16_t (*joints)[4];
   const float (*weights)[4]; /* the sum is 1 */
 } orb_skin_surface;

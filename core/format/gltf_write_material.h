@@ -19,7 +19,7 @@ typedef struct orb_gltf_textures {
   int32_t *of_value;
 } orb_gltf_textures;
 
-/* O(materials + values): an image has a hundred samplers at most. Free also after an error. */
+/* O(materials + values): an image has at most 108 samplers, all that glTF allows. Free also after an error. */
 ORB_MUST_CHECK orb_status orb_gltf_textures_collect(orb_context *ctx, const orb_gltf_scene *scene,
                                                     orb_gltf_textures *out);
 void orb_gltf_textures_free(orb_context *ctx, orb_gltf_textures *textures);

@@ -12,7 +12,7 @@ typedef struct orb_pixels {
 enum { ORB_IMAGE_SIDE_MAX = 16384 };
 
 /* ORB_E_CORRUPT: not a PNG or JPEG that can be read, or a JPEG of more than 100 scans; ORB_E_TOO_LARGE;
- * ORB_E_NO_MEMORY. Free the pixels by orb_free(). */
+ * ORB_E_NO_MEMORY. Free the pixels with orb_free(). */
 ORB_MUST_CHECK orb_status orb_image_decode(orb_context *ctx, const unsigned char *bytes, size_t size, orb_pixels *out);
 
 /* Appends a PNG of 8 bits a channel, without facts about colours, as glTF tells viewers to ignore these. has_alpha:

@@ -28,13 +28,13 @@ extern "C" {
 /* member: below ORB_MATERIAL_MEMBER_COUNT. */
 const orb_member_row *orb_member_row_of(orb_material_member member);
 
-/* The numbers that a value of this member has in glTF; of a texture 1 if it has a scale or strength. */
+/* How many numbers a value of this member has in glTF: of a texture 1 if it has a scale or strength, else 0. */
 int orb_member_numbers(orb_material_member member);
 
 /* The name of a texture's number: "scale", "strength"; NULL if it has none. */
 const char *orb_member_factor(orb_material_member member);
 
-/* The number within the limits of the member; 0 of an index of refraction stays (it stands for infinity). */
+/* The nearest number in the range of the member. An index of refraction of 0 stays: it stands for infinity. */
 double orb_member_clamp(orb_material_member member, double number);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* Wavefront OBJ: v (with colours after the position), vt, vn, f, usemtl; everything else is skipped. Indices may be
+/* Wavefront OBJ: v (with colours after the position), vt, vn, f, o, usemtl; everything else is skipped. Indices may be
  * negative (counted back from the last element) or point forward. */
 #include <string.h>
 

@@ -100,7 +100,8 @@ static inline int orb_text_number(orb_text *text, double *out) {
   return 1;
 }
 
-/* Takes the decimal integer at `at`, which a break must follow. Returns 0 if there is none or it is 2⁵⁸·10 or more. */
+/* Takes the decimal integer at `at`, which a break must follow. Returns 0 if there is none, or if it or
+ * its opposite exceeds 2⁵⁸·10 + 9. */
 static inline int orb_text_integer(orb_text *text, int64_t *out) {
   const unsigned char *p = text->at;
   int negative = 0;

@@ -1,6 +1,6 @@
 /* ORB_CLONES before a function compiles it for several vector widths, of which the loader chooses one. For loops whose
- * results do not depend on the width. Its name must be unique in the library, even where it is static: the resolvers
- * that clang makes are global. */
+ * results do not depend on the width. The function's name must be unique in the library, even where it is static: the
+ * resolvers that clang makes are global. */
 #ifndef ORB_NUMERIC_CLONES_H
 #define ORB_NUMERIC_CLONES_H
 

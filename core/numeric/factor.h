@@ -21,7 +21,7 @@ typedef struct orb_coupling {
 ORB_MUST_CHECK orb_status orb_factor_create(int32_t n, const orb_coupling *couplings, int64_t count, orb_factor **out);
 void orb_factor_destroy(orb_factor *factor);
 
-/* Factorises with this diagonal, in which every row's sum is positive. O(n^1.5) for a surface. */
+/* Factorises with this diagonal, which must make the sum of every row positive. O(n^1.5) for a surface. */
 ORB_MUST_CHECK orb_status orb_factor_compute(orb_factor *factor, const double *diagonal);
 
 /* Solves for three right sides at once: x and right are 3 an unknown. O(n log n) for a surface. */

@@ -147,7 +147,7 @@ static inline void vd_gather3(const double *point, const int32_t *id, vd out[3])
 }
 #endif
 
-/* Lane l gets the four doubles at row[l], and the four floats. Loads and shuffles are faster than gathers. */
+/* Lane l gets the four doubles, or the four floats, at row[l]. Loads and shuffles are faster than gathers. */
 #if ORB_LANES == 8 && defined(__AVX512F__)
 static inline __m512d lanes_two_rows(const double *low, const double *high) {
   return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(low)), _mm256_loadu_pd(high), 1);

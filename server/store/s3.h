@@ -28,8 +28,8 @@ typedef struct s3_request {
   const char *meta; /* kept beside the object as x-amz-meta-sha256; NULL: nothing */
   int to;           /* a file that takes the body of an answer 2xx from its start; −1: `text` takes it */
   int tries;        /* at most; ≥ 1 */
-  /* Not 0: it is signed as of this time of s3_clock(), and S3 refuses it after so many seconds, however late it comes.
-   */
+  /* Not 0: the URL is signed with this time of s3_clock(), and S3 refuses the request if it comes more than so many
+   * seconds later. */
   int64_t signed_at;
   long seconds;
 } s3_request;
@@ -47,21 +47,23 @@ typedef struct s3_answer {
 /* NULL: out of memory, or libcurl cannot be initialised. */
 s3 *s3_open(const s3_options *options);
 void s3_close(s3 *store);
-/* For the requests from now on. */
+/* Signs the requests from now on with these keys. */
 void s3_use_keys(s3 *store, const s3_keys *keys);
-/* Sends a request, again after 5xx, 429, a lost connection or half an answer, after pauses that grow and are drawn at
- * random. The caller frees out->text. */
+/* Sends a request, and sends it again after 5xx, 429, a lost connection or half an answer. It pauses before each
+ * further try: see s3_pause(). The caller frees out->text. */
 void s3_send(s3 *store, const s3_request *request, s3_answer *out);
-/* What time it is for S3, a Unix time, as far as its last answer says: never ahead of S3, but behind it by the time
- * that an answer took, and by what this process did not run. */
+/* What time it is for S3, a Unix time, counted on from the date of its last answer; before the first answer, the
+ * time of this machine. After an answer it is never ahead of S3. It is behind by the time that passed until this
+ * process had the answer, and by the time that the machine has slept since. */
 int64_t s3_clock(s3 *store);
-/* The pause after so many tries before, from 0. */
+/* Pauses after try number `tried`, from 0. The pause is drawn at random, so that daemons do not try in step; its mean
+ * doubles with each try. */
 void s3_pause(int tried);
 /* A URL that lets anyone GET an object for so many seconds. more: see s3_presign(). 0: it does not fit. */
 int s3_link(s3 *store, const char *key, long seconds, const char *more, char *out, size_t size);
 
-/* The text of an XML element, after *at, which then is behind it; with the five entities decoded. 0: there is none, or
- * it does not fit. */
+/* The text of the first XML element of this name after *at; moves *at behind it. Decodes the five entities of XML, and
+ * &#34;. 0: there is none, or it does not fit. */
 int s3_element(const char **at, const char *name, char *out, size_t size);
 
 #endif

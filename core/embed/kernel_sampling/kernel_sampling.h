@@ -35,8 +35,8 @@
 /* What the paper's Table 1 and Fig. 13 report. */
 typedef struct orb_ks_report {
   double simplify_seconds, place_seconds, optimize_seconds;
-  double kernel_points; /* average number inside the kernel, a placement */
-  double iterations;    /* average of Algorithm 1, an execution */
+  double kernel_points; /* how many samples of a placement lie in the kernel, on average */
+  double iterations;    /* of an execution of Algorithm 1, on average */
   int32_t executions;   /* of Algorithm 1 */
   int32_t clipped;      /* placements that no sample served */
   int32_t loosened;     /* placements into dense regions */

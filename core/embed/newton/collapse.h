@@ -11,7 +11,7 @@ ORB_MUST_CHECK orb_status orb_collapse_reserve(orb_context *ctx, orb_hierarchy *
  * record; both may be NULL. */
 void orb_collapse_apply(orb_corner_table *s, int32_t first, int32_t valence, orb_collapse *out, float *areas);
 
-/* Undoes logged collapse `index`, which must be the last that is not undone; applies it again. */
+/* Undo takes back logged collapse `index`, which must be the last that is not undone. Redo applies it again. */
 void orb_collapse_undo(orb_hierarchy *h, int32_t index);
 void orb_collapse_redo(orb_hierarchy *h, int32_t index);
 

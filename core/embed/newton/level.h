@@ -1,6 +1,6 @@
 /* One level of the refinement, laid out as batches for the vector sweeps. Its vertices are coloured so that neighbours
- * differ, and sorted by colour and valence; a batch is `lanes` of them, of one colour. It holds the rings of its
- * vertices and the shapes of their triangles lane by lane. */
+ * differ, and sorted by colour and valence. A batch has `lanes` vertices of one colour, and holds their rings and the
+ * shapes of their triangles lane by lane. */
 #ifndef ORB_EMBED_NEWTON_LEVEL_H
 #define ORB_EMBED_NEWTON_LEVEL_H
 

@@ -8,10 +8,9 @@
 ORB_MUST_CHECK orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
                                          double *points, orb_embed_timings *timings);
 
-/* The same with the energy of angles, whatever options->energy_weight says: fills points of an embedding whose
- * triangles are nearly of their own shapes, and whose limbs are small. For alignment: on a sphere that stretches a
- * surface little in one direction against another, the straight edges of another mesh stay where its curves would lie.
- * The points are not certified yet. */
+/* The same with the energy of angles, whatever options->energy_weight says: triangles nearly keep their shapes, and
+ * limbs become small. Alignment takes it for the even sphere. An embedding that stretches a surface about as much in
+ * every direction hardly bends the straight edges of another mesh. The points are not certified yet. */
 ORB_MUST_CHECK orb_status orb_newton_run_angles(orb_context *ctx, const orb_mesh *mesh,
                                                 const orb_embed_options *options, double *points);
 

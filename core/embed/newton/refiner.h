@@ -29,7 +29,7 @@ void orb_refiner_one_way(orb_refiner *refiner);
 /* Frees a refiner and leaves its hierarchy as it is, fit only to be destroyed. NULL is fine. */
 void orb_refiner_abandon(orb_context *ctx, orb_refiner *refiner);
 
-/* Keep angles and let areas go, on all levels from here on. */
+/* From here on, sweeps of all levels keep angles and let areas go. */
 void orb_refiner_keep_angles(orb_refiner *refiner);
 
 /* How many vertices live. */

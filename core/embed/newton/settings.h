@@ -5,10 +5,10 @@
 #include "embed/newton/vector/jobs.h"
 #include "orbmorph/embed.h"
 
-enum { ORB_NEWTON_FAR = 8 }; /* a level of fewer vertices than this share of all is far from full resolution */
+enum { ORB_NEWTON_FAR = 8 }; /* a level with fewer than 1/8 of all vertices is far from full resolution */
 
 typedef struct orb_newton_settings {
-  double growth, growth_fine; /* of the number of vertices from level to level, below and from fine_from vertices on */
+  double growth, growth_fine; /* of the vertex count from level to level: below fine_from vertices, and from there on */
   int32_t fine_from;
   int32_t coarse_until; /* levels of fewer vertices get coarse_sweeps: they are cheap, and they decide most */
   int32_t coarse_sweeps, level_sweeps, final_sweeps; /* final_sweeps: at full resolution */

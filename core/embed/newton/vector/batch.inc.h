@@ -1,4 +1,4 @@
-/* What a sweep works on: a batch of ORB_BATCH vertices, as one vector of floats (bf, masks bm) or, half by half, as
+/* What a sweep works on: a batch of BATCH vertices, as one vector of floats (bf, masks bm) or, half by half, as
  * doubles (vd). Included after numeric/lanes.inc.h. */
 
 enum { BATCH = 2 * ORB_LANES, HALVES = 2 };

@@ -2,10 +2,10 @@
  *
  * Collapsing v into its neighbour r_j leaves the triangles r_j r_{j+i} r_{j+i+1}. The cost is the sum of S²/A over them
  * (S the sum of squared edges, A the area, at least S/1000; small and round is cheap). A triangle that faces against
- * the star's normal counts three times; a valence above 8 adds a quarter of the sum for each neighbour beyond it. The
- * whole is multiplied by the star's target area over its own area, which keeps vertices that already stand for much.
- * All targets j are evaluated side by side: the ring is stored twice over, so that the rotation by i is an unaligned
- * load. */
+ * the star's normal counts three times. If r_j then has more than 8 neighbours, each further one adds a quarter of the
+ * sum. The whole is multiplied by the star's target area over its own area, which keeps vertices that already stand for
+ * much. All targets j are evaluated side by side: the ring is stored twice over, so that the rotation by i is an
+ * unaligned load. */
 
 enum { COST_ROOM = 2 * ORB_COST_RING_MAX + 2 * WIDE };
 

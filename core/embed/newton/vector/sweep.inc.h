@@ -7,8 +7,8 @@
  * point can do to a determinant (about 4e-16 times that radius). Lanes that start below twice that bound are reported
  * as stiff and left to the scalar step with its exact test.
  *
- * In floats, rounding can change a determinant by about 1e-6 of the squares of its sides; FLAT is well above that, and
- * a bound as in doubles, for the largest radius there is, is added. */
+ * In floats, rounding can change a determinant by about 1e-6 of the squares of its sides. SWEEP_FLAT is well above
+ * that. Twice the bound of doubles is added to it. */
 
 enum {
   SWEEP_GROUP = 2, /* batches that are swept side by side */
