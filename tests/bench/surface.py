@@ -5,6 +5,7 @@ percent too long.
 """
 import heapq
 import math
+import threading
 
 
 def minus(p, q):
@@ -69,6 +70,7 @@ class Surface:
         low, high = (tuple(f(p[k] for p in self.positions) for k in range(3)) for f in (min, max))
         self.diagonal = math.dist(low, high)
         self.links = None
+        self.linking = threading.Lock()
 
     def link_vertices(self):
         self.links = [[] for _ in self.positions]
@@ -118,8 +120,9 @@ class Surface:
 
     def length(self, place, image):
         """The length of the way from a place to a point of the surface: A*, the straight line being the bound."""
-        if self.links is None:
-            self.link_vertices()
+        with self.linking:  # several maps onto one surface are measured at once
+            if self.links is None:
+                self.link_vertices()
         start, end = self.position(place), self.triangle_at(image)
         if set(self.triangles[place[0]]) & set(self.triangles[end]):
             return math.dist(start, image)
