@@ -267,6 +267,11 @@ static orb_status let_go(orb_map_run *c) {
   return orb_map_run_start(c, ORB_MAP_GIVEN);
 }
 
+/* Where lengths alone have led to a map of shapes that correspond. */
+static int should_slide(const orb_map_run *c, orb_map_from from) {
+  return c->given_target ? c->keeps_angles : from == ORB_MAP_FROM_WALK && c->best_energy <= c->params.energy.good;
+}
+
 /* Writes the best map back if it is better than the alignment as given and certified. */
 static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double energy[2], int *improved) {
   orb_aligned_shape *shapes[2] = {c->moving, fixed};
@@ -358,7 +363,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     const int is_hopeless = c.course.is_beaten || (c.given_target && c.best_energy > c.params.targets.hopeless);
     if (!is_hopeless && (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0])) {
       ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
-      if (c.given_target && c.keeps_angles) {
+      if (should_slide(&c, guide->from)) {
         ORB_GO(status, orb_map_slide(&c), done);
       }
     }

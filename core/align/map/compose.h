@@ -5,7 +5,7 @@
  * certified, under which the map has less energy. Read in this order:
  *
  *   engine/   the optimiser: levels of the moving shape on the fixed one, and all parameters (engine/params.h)
- *   starts/   first maps: mirror landmarks, non-rigid registration, the landmark walk, shifted landmarks
+ *   starts/   first maps: mirror landmarks, non-rigid registration, the landmark walk
  *   twist/    limbs that a map has twisted, and untwisting them
  *   swap.h    which of two shapes moves
  *   levels.h  from the first level of a start to all vertices

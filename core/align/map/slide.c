@@ -2,7 +2,7 @@
  * Bumps and hollows tell more. So the moving shape slides in space over the fixed one (elastic/elastic.h), from where
  * the map takes it, and the map is drawn to where it comes to lie. Flips are allowed on the way, which also smooths
  * crumples. Without landmarks the errors of six pairs of people fall by a tenth, with 24 landmarks by a fifth, and the
- * energy by a hundredth or so. */
+ * energy rises by a hundredth or so. */
 #include "align/map/slide.h"
 
 #include <math.h>

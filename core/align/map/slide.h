@@ -1,4 +1,5 @@
-/* The last step towards targets: the best map slides to where the two shapes fit each other in space. */
+/* The last step towards targets, and of a landmark walk: the best map slides to where the two shapes fit each other in
+ * space. */
 #ifndef ORB_ALIGN_MAP_SLIDE_H
 #define ORB_ALIGN_MAP_SLIDE_H
 
