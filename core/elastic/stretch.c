@@ -86,7 +86,7 @@ static void smooth_range(void *arg, int64_t begin, int64_t end, int thread) {
       }
     }
     for (int k = 0; k < 9; k++) {
-      sum[k] /= all;
+      sum[k] /= all + ORB_TINY; /* triangles may have no area */
     }
   }
 }

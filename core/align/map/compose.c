@@ -364,7 +364,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     if (!is_hopeless && (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0])) {
       ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
       if (should_slide(&c, guide->from)) {
-        ORB_GO(status, orb_map_slide(&c), done);
+        ORB_GO(status, orb_map_slide(&c, energy[0]), done);
       }
     }
   }

@@ -59,7 +59,7 @@ static orb_status draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh)
   return orb_map_loosen(c, l, p->clear.first_barrier, p->slide.loosen, p->slide.sweeps);
 }
 
-orb_status orb_map_slide(orb_map_run *c) {
+orb_status orb_map_slide(orb_map_run *c, double below) {
   orb_context *ctx = c->ctx;
   orb_corner_table s;
   orb_map_level level = {0};
@@ -69,7 +69,7 @@ orb_status orb_map_slide(orb_map_run *c) {
   ORB_GO(status, slide_targets(c, &level, s.to_mesh), done);
   ORB_GO(status, draw(c, &level, s.to_mesh), done);
   const double energy = orb_map_level_energy(&level);
-  if (energy <= c->params.slide.most * c->best_energy && !orb_map_level_flips(&level) &&
+  if (energy <= c->params.slide.most * c->best_energy && energy < below && !orb_map_level_flips(&level) &&
       orb_map_level_covers_once(&level)) {
     for (int32_t v = 0; v < level.count; v++) {
       memcpy(c->best + 3 * (size_t)s.to_mesh[level.vertex[v]], level.x + 3 * (size_t)v, sizeof(double[3]));

@@ -6,7 +6,7 @@
 #include "align/map/engine/run.h"
 
 /* Replaces the best map, which needs its places on the fixed shape as it is now, unless it would cost more energy than
- * params.slide.most allows. */
-ORB_MUST_CHECK orb_status orb_map_slide(orb_map_run *run);
+ * params.slide.most allows, or `below` and more: only a map below the energy of the alignment as given is kept. */
+ORB_MUST_CHECK orb_status orb_map_slide(orb_map_run *run, double below);
 
 #endif
