@@ -8,9 +8,10 @@
  * other.
  *
  * A slide differs in two things. An edge should be what rotations and smoothed stretches make of it (stretch.h): bodies
- * that differ in girth otherwise slide along each other until their lengths agree. And it looks for places ahead of
- * where the mesh is, on the way that it took in the last round (momentum; Polyak 1964): a vertex is pulled to where it
- * is already but for its distance from the surface, and so moves along the surface by little in each round. */
+ * that differ in girth otherwise drift along each other until their lengths agree. And it looks for places ahead of
+ * where the mesh is, on the way that it took in the last round (momentum; Nesterov 1983). A place is where the vertex
+ * is already, except for its distance from the surface, so a pull moves it along the surface by little in each round.
+ */
 #include "elastic/elastic.h"
 
 #include <math.h>
@@ -40,7 +41,7 @@ enum {
 /* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
 static const double MAP_REACH = 0.6, FIRST_REACH = 0.6, LAST_REACH = 0.06;
 static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
-/* More lets people slide nearer to the truth, and animals of other proportions away from it. */
+/* A longer first one lets people slide nearer to the truth, and animals of other proportions away from it. */
 static const double SLIDE_FIRST_REACH = 0.3, SLIDE_LAST_REACH = 0.06;
 static const double AHEAD = 0.8; /* of the way of the last round: how far ahead a slide looks */
 /* The rough map goes on to pull beside the places, with this share of its strength at first and nothing from FADED of

@@ -10,7 +10,7 @@ typedef struct orb_stretch {
   double *moment, *next; /* of the edges now with those; 9 a vertex */
 } orb_stretch;
 
-/* For the vertices of a body. Free `out` in any case. As orb_stretch_fit(). */
+/* For the vertices of a body. Free `out` in any case. O(n · rounds of smoothing), on all threads. */
 ORB_MUST_CHECK orb_status orb_stretch_create(orb_context *ctx, const orb_body *body, orb_stretch *out);
 void orb_stretch_free(orb_context *ctx, orb_stretch *stretch);
 

@@ -11,7 +11,7 @@
  *   levels.h  from the first level of a start to all vertices
  *   start.h   one start, and passes of starts through samples of the best map
  *   targets.h the order of the starts where targets are given
- *   slide.h   the last step there
+ *   slide.h   the last step there on spheres that keep angles, and of a walk to a good map
  *   walked.h  the quick way: a landmark walk, optimised on a coarse level
  *   lifted.h  the map of a decimated copy, refined to all vertices
  *   compose.c the order of the starts
