@@ -1,12 +1,11 @@
-/* A pose of a coarse mesh, for points beside it. */
+#include "elastic/carry.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "elastic/elastic.h"
 #include "numeric/vec3.h"
-#include "orbmorph/locate.h"
 
 enum { GRAIN = 128 }; /* points of one task */
 

@@ -52,9 +52,9 @@ static const double MAP_SHARE = 0.3, FADED = 0.7;
 static const double OUTLIER_FIRST = 10, OUTLIER_MAP = 0.6, OUTLIER_PLACE = 0.4;
 static const double NORMAL_SHARE = 0.05; /* of normals beside positions in a first rotation: a limb is nearly a line */
 static const double FACING = 0.2;        /* least cosine of two normals: with less the place does not pull */
-static const double HELD = 0.2;          /* weight with which such a vertex is held where it is, relative to a pull */
-static const double SLIDE = 0.1;         /* most that a place slides from a vertex within its tangent plane */
-static const double ANCHORED = 10;       /* pull of an anchor, relative to the edges of its vertex */
+static const double HELD = 0.2; /* weight with which such a vertex is held where it looks from, relative to a pull */
+static const double PLANE_MOST = 0.1;      /* most that a place slides from a vertex within its tangent plane */
+static const double ANCHORED = 10;         /* pull of an anchor, relative to the edges of its vertex */
 static const double LEAST_DIAGONAL = 1e-9; /* keeps the matrix regular where nothing pulls */
 
 typedef struct registration {
@@ -187,13 +187,13 @@ static void pull_by_map(registration *r, double weight, double outlier) {
   }
 }
 
-/* The point of the tangent plane of p that is nearest to x, or SLIDE from p on the way to it. */
-static void slide(const double p[3], const double n[3], const double x[3], double out[3]) {
+/* The point of the tangent plane of p that is nearest to x, or PLANE_MOST from p on the way to it. */
+static void within_plane(const double p[3], const double n[3], const double x[3], double out[3]) {
   double away[3];
   orb_sub(x, p, away);
   double off = orb_dot(away, n), along = sqrt(fmax(0, orb_dot(away, away) - off * off));
   for (int k = 0; k < 3; k++) {
-    out[k] = p[k] + (away[k] - off * n[k]) * (along > SLIDE ? SLIDE / along : 1);
+    out[k] = p[k] + (away[k] - off * n[k]) * (along > PLANE_MOST ? PLANE_MOST / along : 1);
   }
 }
 
@@ -239,14 +239,14 @@ static void pull_by_place(registration *r, double weight) {
     const double *x = position + 3 * (size_t)v, *n = r->normal + 3 * (size_t)v;
     size_t u = 3 * (size_t)r->place[v];
     int faces = orb_dot(n, r->b.normal + u) > FACING;
-    slide(r->b.mesh->positions + u, r->b.normal + u, x, target);
+    within_plane(r->b.mesh->positions + u, r->b.normal + u, x, target);
     add_pull(r, v, faces ? target : x, weight * r->a.mass[v] * (faces ? 1 : HELD));
   }
   for (int32_t u = 0; u < r->b.count; u++) {
     const double *x = r->b.mesh->positions + 3 * (size_t)u, *n = r->b.normal + 3 * (size_t)u;
     int32_t v = r->visit[u];
     if (orb_dot(n, r->normal + 3 * (size_t)v) > FACING) {
-      slide(x, n, position + 3 * (size_t)v, target);
+      within_plane(x, n, position + 3 * (size_t)v, target);
       add_pull(r, v, target, weight * r->b.mass[u]);
     }
   }

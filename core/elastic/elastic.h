@@ -8,7 +8,8 @@
  *   searched.h  vertices, laid out for searches of the nearest one
  *   body.h      a mesh with what the steps read
  *   stretch.h   how the surroundings of a vertex are stretched
- *   elastic.h   the registration; carry.c carries it to other points
+ *   elastic.h   the registration
+ *   carry.h     its pose, for other points
  *
  * Source: Sorkine & Alexa 2007 (as-rigid-as-possible energy: rotations of vertices and positions take turns), with
  * iterative closest points (Besl & McKay 1992) in both directions.
@@ -62,10 +63,5 @@ ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a
  * Changes the positions, 3 a vertex. O(n · m) a round, 10 rounds. On all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_slide(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                             const orb_elastic_anchors *anchors, double *position);
-
-/* Carries a pose of a coarse mesh to points beside it: each point moves with the corners of its nearest triangle.
- * points: 3 each. out->rotation may be NULL. O(count log n), on all threads. */
-ORB_MUST_CHECK orb_status orb_elastic_carry(orb_context *ctx, const orb_mesh *coarse, const orb_elastic_pose *pose,
-                                            const double *points, int32_t count, orb_elastic_pose *out);
 
 #endif

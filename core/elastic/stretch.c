@@ -12,8 +12,8 @@
 
 enum {
   GRAIN = 128,      /* vertices of one task */
-  ROUND_EACH = 600, /* vertices of a mesh for each round of smoothing, which then reaches a tenth of the girth of a body
-                       at any resolution. Four times as much is as good */
+  ROUND_EACH = 600, /* vertices of a mesh for each round of smoothing, which then reaches as far from 2,400 to 24,000
+                       vertices. Four times as much is as good */
   ROUNDS_LEAST = 4,
   ROUNDS_MOST = 40
 };
@@ -22,7 +22,7 @@ static const double MEAN_SHARE = 0.2;
 
 typedef struct fitting {
   const orb_body *body;
-  const double *position, *rotation;
+  const double *position, *rotation; /* now; NULL: as given */
   orb_stretch *stretch;
 } fitting;
 
@@ -33,34 +33,24 @@ void orb_stretch_free(orb_context *ctx, orb_stretch *stretch) {
   orb_free(ctx, stretch->next);
 }
 
-static void gather_given(void *arg, int64_t begin, int64_t end, int thread) {
-  const fitting *f = arg;
-  const orb_body *body = f->body;
-  (void)thread;
-  for (int64_t v = begin; v < end; v++) {
-    double *m = f->stretch->moment + 9 * v, p[3];
-    memset(m, 0, sizeof(double[9]));
-    for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
-      orb_sub(body->mesh->positions + 3 * (size_t)body->next[i], body->mesh->positions + 3 * v, p);
-      orb_add_outer(m, p, p, body->weight[i]);
-    }
-  }
-}
-
-static void gather_now(void *arg, int64_t begin, int64_t end, int thread) {
+/* Without positions, the edges now are those as given. */
+static void gather_range(void *arg, int64_t begin, int64_t end, int thread) {
   const fitting *f = arg;
   const orb_body *body = f->body;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
     double *m = f->stretch->moment + 9 * v;
-    const double *r = f->rotation + 9 * v;
     memset(m, 0, sizeof(double[9]));
     for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
       double p[3], now[3], q[3];
       orb_sub(body->mesh->positions + 3 * (size_t)body->next[i], body->mesh->positions + 3 * v, p);
-      orb_sub(f->position + 3 * (size_t)body->next[i], f->position + 3 * v, now);
-      for (int k = 0; k < 3; k++) {
-        q[k] = r[k] * now[0] + r[3 + k] * now[1] + r[6 + k] * now[2];
+      memcpy(q, p, sizeof q);
+      if (f->position) {
+        const double *r = f->rotation + 9 * v;
+        orb_sub(f->position + 3 * (size_t)body->next[i], f->position + 3 * v, now);
+        for (int k = 0; k < 3; k++) {
+          q[k] = r[k] * now[0] + r[3 + k] * now[1] + r[6 + k] * now[2];
+        }
       }
       orb_add_outer(m, q, p, body->weight[i]);
     }
@@ -161,16 +151,18 @@ orb_status orb_stretch_create(orb_context *ctx, const orb_body *body, orb_stretc
   if (!out->linear || !out->given || !out->moment || !out->next) {
     return ORB_E_NO_MEMORY;
   }
-  orb_parallel_for(ctx, body->count, GRAIN, gather_given, &f);
+  orb_parallel_for(ctx, body->count, GRAIN, gather_range, &f);
   smooth(ctx, &f);
-  memcpy(out->given, out->moment, n * sizeof *out->given);
+  double *room = out->given;
+  out->given = out->moment;
+  out->moment = room;
   return ORB_OK;
 }
 
 void orb_stretch_fit(orb_context *ctx, const orb_body *body, const double *position, const double *rotation,
                      orb_stretch *stretch) {
   fitting f = {body, position, rotation, stretch};
-  orb_parallel_for(ctx, body->count, GRAIN, gather_now, &f);
+  orb_parallel_for(ctx, body->count, GRAIN, gather_range, &f);
   smooth(ctx, &f);
   orb_parallel_for(ctx, body->count, GRAIN, fit_range, &f);
 }

@@ -19,7 +19,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
-#include "elastic/elastic.h"
+#include "elastic/carry.h"
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
 
