@@ -100,12 +100,12 @@ orb_status orb_hint_stretch(orb_context *ctx, const orb_hint_places *places, con
   return status;
 }
 
-double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *first, const double *pose) {
+double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *copy, int s, const double *pose) {
   double sum = 0;
   for (int32_t i = 0; i < places->few; i++) {
-    const size_t v = 3 * (size_t)places->vertex[0][i];
-    double beside = sqrt(orb_distance2(first->mesh.positions + v, places->at[0] + 3 * (size_t)i));
-    double away = sqrt(orb_distance2(pose + v, places->at[1] + 3 * (size_t)i));
+    const size_t v = 3 * (size_t)places->vertex[s][i];
+    double beside = sqrt(orb_distance2(copy->mesh.positions + v, places->at[s] + 3 * (size_t)i));
+    double away = sqrt(orb_distance2(pose + v, places->at[1 - s] + 3 * (size_t)i));
     sum += fmax(0, away - beside); /* a landmark lies beside the vertex that stands for it */
   }
   return places->few > 0 ? sum / places->few : 0;

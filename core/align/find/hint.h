@@ -36,8 +36,8 @@ ORB_MUST_CHECK orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hi
 ORB_MUST_CHECK orb_status orb_hint_stretch(orb_context *ctx, const orb_hint_places *places,
                                            const orb_coarse_copy copy[2], double *stretch);
 
-/* How far the landmarks of the first copy end from their partners, in the mean, where `pose` has its vertices in the
- * space of the second one (3 each). */
-double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *first, const double *pose);
+/* How far the landmarks of copy s end from their partners, in the mean, where `pose` has its vertices in the space of
+ * the other one (3 each). */
+double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *copy, int s, const double *pose);
 
 #endif

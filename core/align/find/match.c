@@ -70,18 +70,26 @@ static orb_status copy_create(const search *t, int s, int32_t size, orb_coarse_c
   return ORB_OK;
 }
 
+static void pose_free(orb_context *ctx, orb_elastic_pose *pose) {
+  orb_free(ctx, pose->position);
+  orb_free(ctx, pose->rotation);
+  memset(pose, 0, sizeof *pose);
+}
+
+/* Room for a pose of a copy. */
+static orb_status pose_create(orb_context *ctx, const orb_mesh *copy, orb_elastic_pose *out) {
+  out->position = ORB_NEW(ctx, double, 3 * (size_t)copy->vertex_count);
+  out->rotation = ORB_NEW(ctx, double, 9 * (size_t)copy->vertex_count);
+  return out->position && out->rotation ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
 /* Poses of a trial, both of its maps in both directions. */
 static orb_status add_trial(search *t, const int32_t *forth, const int32_t *back) {
   trial *one = &t->trial[t->count++];
   one->map[0] = (orb_rough_map){forth, back};
   one->map[1] = (orb_rough_map){back, forth};
   for (int s = 0; s < 2; s++) {
-    size_t n = (size_t)t->copy[s].mesh.vertex_count;
-    one->pose[s].position = ORB_NEW(t->ctx, double, 3 * n);
-    one->pose[s].rotation = ORB_NEW(t->ctx, double, 9 * n);
-    if (!one->pose[s].position || !one->pose[s].rotation) {
-      return ORB_E_NO_MEMORY;
-    }
+    ORB_TRY(pose_create(t->ctx, &t->copy[s].mesh, &one->pose[s]));
   }
   return ORB_OK;
 }
@@ -210,33 +218,53 @@ static int32_t best_of(const search *t) {
   return best;
 }
 
-/* Drops the trials that take the landmarks elsewhere. */
-static void drop_against_hint(search *t) {
+/* Drops the trials whose pose s takes the landmarks elsewhere. */
+static void drop_against_hint(search *t, int s) {
   for (int32_t i = 0; i < t->count; i++) {
-    double off = orb_hint_off(&t->hint, &t->copy[0], t->trial[i].pose[0].position);
-    if (off > ORB_FIND_HINT_OFF) {
+    if (orb_hint_off(&t->hint, &t->copy[s], s, t->trial[i].pose[s].position) > ORB_FIND_HINT_OFF) {
       t->trial[i].cost = INFINITY;
     }
   }
 }
 
-/* Registers all in one direction, drops those that are too far behind to win, and registers the others back. */
+/* Does the first pose of a trial take the landmarks to their partners? */
+static int any_agrees(const search *t) {
+  int any = 0;
+  for (int32_t i = 0; i < t->count; i++) {
+    any |= orb_hint_off(&t->hint, &t->copy[0], 0, t->trial[i].pose[0].position) <= ORB_FIND_HINT_OFF;
+  }
+  return any;
+}
+
+/* Costs of the trials that are not dropped, by these directions. */
+static void fill_costs(search *t, int directions) {
+  for (int32_t i = 0; i < t->count; i++) {
+    if (t->trial[i].cost < INFINITY) {
+      fill_cost(t, &t->trial[i], directions);
+    }
+  }
+}
+
+/* Registers all in one direction, drops those that are too far behind to win, and registers the others back. Trials
+ * that take the landmarks elsewhere are dropped after the first direction, or, where all do, after the second: arms that
+ * lie on a body are registered to it in one direction, and rightly in the other. */
 static orb_status rank(search *t) {
-  for (int direction = 0; direction < 2; direction++) {
-    ORB_TRY(register_all(t, direction));
-    if (direction == 0) {
-      drop_against_hint(t);
-    }
-    for (int32_t i = 0; i < t->count; i++) {
-      if (t->trial[i].cost < INFINITY) {
-        fill_cost(t, &t->trial[i], direction + 1);
-        t->trial[i].rough = direction == 0 ? t->trial[i].cost : t->trial[i].rough;
-      }
-    }
-    double most = ORB_FIND_BEHIND * t->trial[best_of(t)].cost;
-    for (int32_t i = 0; i < t->count && direction == 0; i++) {
-      t->trial[i].cost = t->trial[i].cost > most ? INFINITY : t->trial[i].cost;
-    }
+  ORB_TRY(register_all(t, 0));
+  const int agrees = any_agrees(t);
+  if (agrees) {
+    drop_against_hint(t, 0);
+  }
+  fill_costs(t, 1);
+  const double most = ORB_FIND_BEHIND * t->trial[best_of(t)].cost;
+  for (int32_t i = 0; i < t->count; i++) {
+    trial *one = &t->trial[i];
+    one->rough = one->cost < INFINITY ? one->cost : one->rough;
+    one->cost = one->cost > most ? INFINITY : one->cost;
+  }
+  ORB_TRY(register_all(t, 1));
+  fill_costs(t, 2);
+  if (!agrees) {
+    drop_against_hint(t, 1);
   }
   return ORB_OK;
 }
@@ -345,30 +373,34 @@ static orb_status write_ranking(const search *t, orb_match *out) {
 }
 
 /* Registers a trial's second copy again with the landmarks as anchors. They only excluded maps until here, since they
- * would draw a wrong one to their partners as well. */
-static orb_status draw_to_landmarks(const search *t, const trial *one) {
+ * would draw a wrong one to their partners as well. Where they bend it far more than it was bent, they have twisted a
+ * limb or the waist, and the pose without them stays. */
+static orb_status draw_to_landmarks(const search *t, trial *one) {
+  const orb_mesh *copy = &t->copy[1].mesh;
   orb_elastic_anchor *anchors = NULL;
-  orb_elastic_pose pose = one->pose[1];
+  orb_elastic_pose drawn = {NULL, NULL};
   double bend;
   orb_status status;
   if (t->hint.count == 0) {
     return ORB_OK;
   }
-  ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, &t->copy[1].mesh, &anchors), end);
+  ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, copy, &anchors), end);
+  ORB_GO(status, pose_create(t->ctx, copy, &drawn), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};
-  status = orb_elastic_register(t->ctx, &t->copy[1].mesh, &t->copy[0].mesh, &one->map[1], &held, &pose, &bend);
+  ORB_GO(status, orb_elastic_register(t->ctx, copy, &t->copy[0].mesh, &one->map[1], &held, &drawn, &bend), end);
+  if (bend <= ORB_FIND_DRAWN_BEND * one->bend[1]) {
+    const orb_elastic_pose before = one->pose[1];
+    one->pose[1] = drawn;
+    drawn = before;
+  }
 end:
+  pose_free(t->ctx, &drawn);
   orb_free(t->ctx, anchors);
   return status;
 }
 
-static void pose_free(orb_context *ctx, orb_elastic_pose *pose) {
-  orb_free(ctx, pose->position);
-  orb_free(ctx, pose->rotation);
-}
-
 /* Settles a finer copy of the second shape on one of the first, and carries its pose to all vertices. */
-static orb_status write_targets(const search *t, const trial *one, double **target) {
+static orb_status write_targets(const search *t, trial *one, double **target) {
   orb_coarse_copy fine[2] = {{{0}, NULL, NULL}, {{0}, NULL, NULL}};
   orb_elastic_pose pose = {NULL, NULL}, all = {NULL, NULL};
   orb_elastic_anchor *anchors = NULL;
@@ -382,15 +414,11 @@ static orb_status write_targets(const search *t, const trial *one, double **targ
   for (int s = 0; s < 2; s++) {
     ORB_GO(status, copy_create(t, s, ORB_FIND_FINE, &fine[s]), end);
   }
-  size_t n = (size_t)fine[1].mesh.vertex_count;
-  pose.position = ORB_NEW(t->ctx, double, 3 * n);
-  pose.rotation = ORB_NEW(t->ctx, double, 9 * n);
-  if (!pose.position || !pose.rotation) {
-    status = ORB_E_NO_MEMORY;
-    goto end;
-  }
+  ORB_GO(status, pose_create(t->ctx, &fine[1].mesh, &pose), end);
   ORB_GO(status, draw_to_landmarks(t, one), end);
-  ORB_GO(status, orb_elastic_carry(t->ctx, &t->copy[1].mesh, &one->pose[1], fine[1].mesh.positions, (int32_t)n, &pose),
+  ORB_GO(status,
+         orb_elastic_carry(t->ctx, &t->copy[1].mesh, &one->pose[1], fine[1].mesh.positions, fine[1].mesh.vertex_count,
+                           &pose),
          end);
   ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, &fine[1].mesh, &anchors), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};

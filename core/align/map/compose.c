@@ -65,6 +65,7 @@ static void orb_map_run_free(orb_map_run *c) {
   orb_free(ctx, c->target);
   orb_free(ctx, c->target_normal);
   orb_free(ctx, c->target_place);
+  orb_free(ctx, c->doubted);
   orb_free(ctx, c->keep);
   orb_free(ctx, c->usable);
   orb_hierarchy_destroy(ctx, c->hierarchy);
@@ -99,8 +100,9 @@ static orb_status prepare(orb_map_run *c) {
   c->target = ORB_NEW(ctx, double, 3 * n);
   c->target_normal = ORB_NEW(ctx, double, 3 * n);
   c->target_place = ORB_NEW(ctx, orb_place, n);
+  c->doubted = ORB_NEW0(ctx, unsigned char, n);
   if (!c->x || !c->normal || !c->keep || !c->usable || !c->position || !c->local || !c->place || !c->start ||
-      !c->best || !c->target || !c->target_normal || !c->target_place) {
+      !c->best || !c->target || !c->target_normal || !c->target_place || !c->doubted) {
     return ORB_E_NO_MEMORY;
   }
   orb_extent extent;

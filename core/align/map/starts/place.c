@@ -39,7 +39,8 @@ static orb_place nearest_with_normal(const orb_map_run *c, int32_t v) {
   return place;
 }
 
-/* The nearest point if the surface faces the right way there; else the nearest vertex in position and normal. */
+/* The nearest point. Where the surface faces another way there, a start that smooths doubts it; others take the nearest
+ * vertex in position and normal instead, which may lie on another limb. */
 static void find_target_places(void *arg, int64_t begin, int64_t end, int thread) {
   target_job *job = arg;
   orb_map_run *c = job->c;
@@ -48,7 +49,9 @@ static void find_target_places(void *arg, int64_t begin, int64_t end, int thread
     double n[3];
     (void)orb_nearest_query(job->tree, c->target + 3 * v, INFINITY, &c->target_place[v]);
     orb_map_surface_at(&c->b, &c->target_place[v], NULL, NULL, n);
-    if (orb_dot(n, c->target_normal + 3 * v) < c->params.place.facing) {
+    const int is_away = orb_dot(n, c->target_normal + 3 * v) < c->params.place.facing;
+    c->doubted[v] = (unsigned char)(is_away && c->keeps_angles);
+    if (is_away && !c->keeps_angles) {
       c->target_place[v] = nearest_with_normal(c, (int32_t)v);
     }
   }
@@ -196,5 +199,5 @@ orb_status orb_map_place(orb_map_run *c, orb_map_level *level, const int32_t *to
   if (start == ORB_MAP_SPATIAL) {
     spread_out(c, level);
   }
-  return start == ORB_MAP_SPATIAL && c->keeps_angles ? orb_map_smooth(c, level) : ORB_OK;
+  return start == ORB_MAP_SPATIAL && c->keeps_angles ? orb_map_smooth(c, level, to_mesh) : ORB_OK;
 }

@@ -48,8 +48,8 @@ static void relax(const smoothing *s, int32_t v) {
   }
 }
 
-/* Does not trust a target that is far from those of most neighbours. */
-static void doubt_outliers(const smoothing *s) {
+/* Does not trust a target that faces another way, or that is far from those of most neighbours. */
+static void doubt_outliers(const smoothing *s, const unsigned char *doubted, const int32_t *to_mesh) {
   const orb_map_level *l = s->level;
   const double far = s->params->smooth.apart;
   for (int32_t v = 0; v < l->count; v++) {
@@ -58,7 +58,7 @@ static void doubt_outliers(const smoothing *s) {
     for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
       near += orb_distance2(s->target + 3 * (size_t)v, s->target + 3 * (size_t)l->spoke[i].q) <= scale2 * far * far;
     }
-    s->trust[v] = s->smooth[v] = 2 * near < l->start[v + 1] - l->start[v] ? 0 : 1;
+    s->trust[v] = s->smooth[v] = doubted[to_mesh[l->vertex[v]]] || 2 * near < l->start[v + 1] - l->start[v] ? 0 : 1;
   }
 }
 
@@ -88,7 +88,7 @@ static void weigh(const smoothing *s) {
   }
 }
 
-orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l) {
+orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
   const orb_map_params *p = &c->params;
   smoothing s = {.level = l,
                  .params = p,
@@ -100,7 +100,7 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l) {
     goto done;
   }
   memcpy(s.target, l->x, 3 * (size_t)l->count * sizeof *s.target);
-  doubt_outliers(&s);
+  doubt_outliers(&s, c->doubted, to_mesh);
   for (int round = 0; round < p->smooth.rounds; round++) {
     for (int sweep = 0; sweep < p->smooth.sweeps; sweep++) {
       for (int32_t v = 0; v < l->count; v++) {

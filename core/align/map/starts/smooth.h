@@ -9,8 +9,8 @@
 #include "align/map/engine/run.h"
 
 /* Moves the vertices of a level that are not pinned to where their targets and their neighbours draw them, and locates
- * them there. Targets that most neighbours contradict, and those of flipped triangles, count less from round to round.
- * O(vertices), one thread. */
-ORB_MUST_CHECK orb_status orb_map_smooth(orb_map_run *run, orb_map_level *level);
+ * them there. Targets that face another way (run->doubted) or that most neighbours contradict do not count; those of
+ * flipped triangles count less from round to round. to_mesh: as of the level's surface. O(vertices), one thread. */
+ORB_MUST_CHECK orb_status orb_map_smooth(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh);
 
 #endif
