@@ -216,8 +216,9 @@ static orb_status spread_landmarks(orb_context *ctx, const double *positions, in
 }
 
 /* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
- * partners, with all of them pinned. *energy: INFINITY if there is no such match, or no such map. */
-static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double stretch,
+ * partners, with all of them pinned. sure: as of the hint. *energy: INFINITY if there is no such match, or no such map.
+ */
+static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double sure,
                                 int keeps_angles, double *energy) {
   orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
   const int32_t count = a->landmark_count, few = count < ORB_FIND_HINT_FEW ? count : ORB_FIND_HINT_FEW;
@@ -233,7 +234,7 @@ static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, o
   memcpy(vertex[0], fixed->landmark_vertices, (size_t)count * sizeof *vertex[0]);
   memcpy(vertex[1], moving->landmark_vertices, (size_t)count * sizeof *vertex[1]);
   ORB_GO(status, spread_landmarks(ctx, fixed->mesh.positions, count, vertex), done);
-  const orb_match_hint hint = {count, few, vertex[0], vertex[1], stretch};
+  const orb_match_hint hint = {count, few, vertex[0], vertex[1], ORB_FIND_HINT_STRETCH_MOST, sure};
   ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match), done);
   if (match.is_found) {
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE, .target = match.target, .keeps_angles = keeps_angles};
@@ -259,10 +260,11 @@ orb_status orb_align_are_alike(orb_context *ctx, orb_alignment *a, orb_preset pr
 
 /* Aligns shapes that are one body in several poses. The map starts on spheres that keep angles, as without landmarks.
  * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
- * what lies between them. *found 0: the landmarks do not show one body, or no map was found, and `out` is empty. */
+ * what lies between them. sure: as of orb_match_hint. *found 0: the landmarks do not show one body, or no map was
+ * found, and `out` is empty. */
 static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                               const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                              double stretch, orb_alignment *out, int *found) {
+                              double sure, orb_alignment *out, int *found) {
   orb_align_options rotated = *options;
   double sum = 0;
   rotated.method = ORB_ALIGN_ROTATE;
@@ -279,7 +281,7 @@ static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, i
   }
   for (int32_t s = 1; s < shape_count && sum < INFINITY && status == ORB_OK; s++) {
     double energy;
-    status = compose_posed(ctx, out, s, options->preset, stretch, !alike, &energy);
+    status = compose_posed(ctx, out, s, options->preset, sure, !alike, &energy);
     sum += energy;
   }
   *found = status == ORB_OK && sum < INFINITY;

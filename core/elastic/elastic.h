@@ -1,6 +1,6 @@
 /* Non-rigid registration of one surface to another, as rigid as possible.
  *
- * In: two meshes of a few thousand vertices, and a rough map between them or places where the first one lies
+ * In: two meshes of up to ten thousand vertices or so, and a rough map between them or places where the first one lies
  * already. Out: where the first one goes so that it lies on the second, and how much that bends it. A rough map of the
  * right limbs bends little, even if it misses their tips by a little. A map of the wrong limbs bends much. So the cost
  * ranks maps. Read in this order:
@@ -46,8 +46,8 @@ typedef struct orb_elastic_pose {
 
 /* Moves mesh a to mesh b along a rough map, then to the nearest places, and its anchors, if any, to theirs. Both meshes
  * are scaled to the same area, near 4π, and have no vertex without triangles. Fills the pose. *bend: mean squared
- * change of the edges of a against the rotations of their ends, relative to their squared lengths. O(n · m) a round, 14
- * rounds: about 0.05 s for two meshes of a thousand vertices. One thread; may run beside others in loops of the
+ * change of the edges of a against the rotations of their ends, relative to their squared lengths. O(n · m) a round, 8
+ * rounds, and O(n²) before them: about 0.03 s for two meshes of a thousand vertices. One thread; may run beside others in loops of the
  * context. */
 ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                                const orb_rough_map *map, const orb_elastic_anchors *anchors,

@@ -10,7 +10,8 @@
 typedef struct orb_match_hint {
   int32_t count, few; /* the first `few` of them exclude maps; all of them draw the best map to their partners */
   const int32_t *first, *second;
-  double stretch; /* orb_hint_stretch() up to which the shapes are one in two poses */
+  double stretch; /* orb_hint_stretch() above which the shapes are not one in two poses */
+  double sure;    /* the same up to which they are; between the two, what the best match bends decides */
 } orb_match_hint;
 
 /* The hint on scaled coarse copies of the shapes. */

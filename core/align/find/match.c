@@ -246,8 +246,8 @@ static void fill_costs(search *t, int directions) {
 }
 
 /* Registers all in one direction, drops those that are too far behind to win, and registers the others back. Trials
- * that take the landmarks elsewhere are dropped after the first direction, or, where all do, after the second: arms that
- * lie on a body are registered to it in one direction, and rightly in the other. */
+ * that take the landmarks elsewhere are dropped after the first direction, or, where all do, after the second: arms
+ * that lie on a body are registered to it in one direction, and rightly in the other. */
 static orb_status rank(search *t) {
   ORB_TRY(register_all(t, 0));
   const int agrees = any_agrees(t);
@@ -440,9 +440,9 @@ end:
   return status;
 }
 
-/* Places the landmarks on the copies. *agrees 0: they say that the shapes are not one in two poses. */
-static orb_status take_hint(search *t, const orb_match_hint *hint, int *agrees) {
-  double *at[2], stretch;
+/* Places the landmarks on the copies. *stretch: how far they say that the shapes are not one in two poses. */
+static orb_status take_hint(search *t, const orb_match_hint *hint, double *stretch) {
+  double *at[2];
   int32_t count = 0, few = 0;
   for (int s = 0; s < 2; s++) {
     at[s] = ORB_NEW(t->ctx, double, 3 * (size_t)hint->count);
@@ -461,28 +461,31 @@ static orb_status take_hint(search *t, const orb_match_hint *hint, int *agrees) 
     few += i < hint->few;
   }
   ORB_TRY(orb_hint_places_create(t->ctx, count, few, at, t->copy, &t->hint));
-  ORB_TRY(orb_hint_stretch(t->ctx, &t->hint, t->copy, &stretch));
-  *agrees = stretch <= hint->stretch;
-  return ORB_OK;
+  return orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch);
+}
+
+/* Does a trial show one shape in two poses? Where it does not, other starts lead to better maps. */
+static int is_one_shape(const trial *one, const orb_match_hint *hint, double stretch) {
+  return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
 }
 
 static orb_status run(search *t, const orb_match_hint *hint, orb_match *out) {
-  int agrees = 1;
+  double stretch = 0;
   for (int s = 0; s < 2; s++) {
     scaling_of(t->mesh[s], &t->scaling[s]);
     ORB_TRY(copy_create(t, s, ORB_FIND_COARSE, &t->copy[s]));
   }
   if (hint) {
-    ORB_TRY(take_hint(t, hint, &agrees));
+    ORB_TRY(take_hint(t, hint, &stretch));
   }
-  if (!agrees) {
+  if (hint && !(stretch <= hint->stretch)) {
     return ORB_OK;
   }
   ORB_TRY(add_spectral(t));
   ORB_TRY(add_rotations(t));
   ORB_TRY(rank(t));
   int32_t best = best_of(t);
-  if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
+  if (t->count == 0 || !(t->trial[best].cost < INFINITY) || !is_one_shape(&t->trial[best], hint, stretch)) {
     return ORB_OK;
   }
   out->is_found = 1;

@@ -9,6 +9,7 @@
 #include "align/map/starts/place.h"
 #include "base/check.h"
 #include "base/context.h"
+#include "base/error.h"
 #include "base/memory.h"
 #include "embed/newton/place.h"
 #include "numeric/vec3.h"
@@ -135,7 +136,7 @@ orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *
     if (!rough && (last || orb_map_level_energy(l) > c->params.level.rigid)) {
       ORB_GO(status, orb_map_loosen(c, l, c->params.level.loosen, count / 2, count / 2), done);
     }
-    *failed = orb_map_level_flips(l) > 0 || (last && !orb_map_level_covers_once(l));
+    *failed = orb_map_level_flips(l) > 0 || (last && orb_map_level_degree(l) != 1);
     if (*failed) {
       break;
     }
@@ -143,7 +144,13 @@ orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *
     if (last) {
       break;
     }
-    ORB_GO(status, orb_map_level_next(c, r, l, known, pull), done);
+    status = orb_map_level_next(c, r, l, known, pull);
+    if (status == ORB_E_NOT_CERTIFIED) { /* crumples left a vertex no room */
+      orb_error_clear(c->ctx);
+      status = ORB_OK;
+      *failed = 1;
+      break;
+    }
   }
 done:
   orb_free(c->ctx, known);

@@ -70,7 +70,7 @@ orb_status orb_map_slide(orb_map_run *c, double below) {
   ORB_GO(status, draw(c, &level, s.to_mesh), done);
   const double energy = orb_map_level_energy(&level);
   if (energy <= c->params.slide.most * c->best_energy && energy < below && !orb_map_level_flips(&level) &&
-      orb_map_level_covers_once(&level)) {
+      orb_map_level_degree(&level) == 1) {
     for (int32_t v = 0; v < level.count; v++) {
       memcpy(c->best + 3 * (size_t)s.to_mesh[level.vertex[v]], level.x + 3 * (size_t)v, sizeof(double[3]));
     }

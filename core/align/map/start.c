@@ -43,7 +43,7 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
     ORB_TRY(orb_map_keep_usable(c, l, to_mesh));
     ORB_TRY(orb_map_release(c, l, to_mesh, flips));
   }
-  *given_up = *flips ? last || *flips > hopeless : !orb_map_level_covers_once(l);
+  *given_up = *flips ? last || *flips > hopeless : orb_map_level_degree(l) != 1;
   return ORB_OK;
 }
 
@@ -73,6 +73,19 @@ orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
 done:
   orb_map_level_free(ctx, &level);
   orb_refiner_destroy(ctx, r);
+  return status;
+}
+
+orb_status orb_map_start_flips(orb_map_run *c, int32_t *flips) {
+  orb_refiner *r = NULL;
+  orb_map_level level = {0};
+  orb_status status;
+  ORB_GO(status, orb_map_levels_begin(c, &r), done);
+  ORB_GO(status, orb_map_level_place(c, r, ORB_MAP_SPATIAL, c->params.level.spatial, &level), done);
+  *flips = orb_map_level_flips(&level);
+done:
+  orb_map_level_free(c->ctx, &level);
+  orb_refiner_destroy(c->ctx, r);
   return status;
 }
 

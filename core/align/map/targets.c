@@ -1,10 +1,11 @@
-/* The targets are smoothed first, by a registration in space through samples of them. A start from them is nearly
- * always a map, landmarks held: unfolding (engine/unfold.h) clears what flips are left. Where the targets are folded it
- * has crumpled, in the pockets of a face and where limbs touch. So it is ironed (engine/iron.h) and drawn to the
- * targets at once, which smooths most of it. Where that leads to no map of shapes that correspond, passes through
- * samples of the best map follow, and then two more starts, until one is such a map: from the targets as given, on a
- * coarser level and on the usual one. Then passes and a draw bring the energy down. Passes come first: they find a
- * better basin, and a draw only the bottom of one. Where no pass helps, the map is drawn to the given targets.
+/* The targets are smoothed first, by a registration in space through samples of them, unless they fold the first level
+ * less as they are. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h) clears what
+ * flips are left. Where the targets are folded it has crumpled, in the pockets of a face and where limbs touch. So it
+ * is ironed (engine/iron.h) and drawn to the targets at once, which smooths most of it. Where that leads to no map of
+ * shapes that correspond, passes through samples of the best map follow, and then two more starts, until one is such a
+ * map: from the targets as given on a coarser level, and from those that the first start has not followed on the usual
+ * one. Then passes and a draw bring the energy down. Passes come first: they find a better basin, and a draw only the
+ * bottom of one. Where no pass helps, the map is drawn to the given targets.
  *
  * Where that gives no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
  * and is optimised on a coarse level, so several are tried, and the best one is refined. Where the caller says so, a
@@ -47,15 +48,27 @@ static orb_status smooth_targets(orb_map_run *c) {
   return status;
 }
 
-/* The targets of the first start. Walks take samples of the targets themselves. */
+/* The targets of the first start: the smooth ones, or those as given where they fold it less, as where limbs lie beside
+ * each other, which a registration in space moves together. Walks take samples of the targets themselves. */
 static orb_status register_first(orb_map_run *c) {
-  return c->walks_first ? orb_map_register(c, 0) : smooth_targets(c);
+  int32_t smooth, given;
+  if (c->walks_first) {
+    ORB_TRY(orb_map_register(c, 0));
+    return orb_map_levels_prepare(c);
+  }
+  ORB_TRY(orb_map_levels_prepare(c));
+  ORB_TRY(orb_map_register(c, 0));
+  ORB_TRY(orb_map_start_flips(c, &given));
+  ORB_TRY(smooth_targets(c));
+  ORB_TRY(orb_map_start_flips(c, &smooth));
+  c->starts_smooth = smooth < given;
+  return c->starts_smooth ? ORB_OK : orb_map_register(c, 0);
 }
 
 /* From the targets that the first start has not followed: the smooth ones, or those as given, which are registered. */
 static orb_status start_from_others(orb_map_run *c) {
   allow(c);
-  if (c->walks_first) {
+  if (!c->starts_smooth) {
     ORB_TRY(smooth_targets(c));
   }
   return orb_map_run_start(c, ORB_MAP_SPATIAL);
@@ -101,7 +114,6 @@ static orb_status run_passes(orb_map_run *c) {
 static orb_status run_first(orb_map_run *c, int *walked) {
   const double given = c->best_energy;
   ORB_TRY(register_first(c));
-  ORB_TRY(orb_map_levels_prepare(c));
   if (c->walks_first) {
     ORB_TRY(start_guided(c));
   }

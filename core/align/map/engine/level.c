@@ -275,14 +275,14 @@ int32_t orb_map_level_flips(const orb_map_level *l) {
   return flips;
 }
 
-int orb_map_level_covers_once(const orb_map_level *l) {
+int32_t orb_map_level_degree(const orb_map_level *l) {
   double area = 0;
   for (int32_t t = 0; t < l->triangle_count; t++) {
     const int32_t *v = l->triangle + 3 * (size_t)t;
     const double *p = l->x + 3 * (size_t)v[0], *q = l->x + 3 * (size_t)v[1], *r = l->x + 3 * (size_t)v[2];
     area += 2 * atan2(orb_det(p, q, r), 1 + orb_dot(p, q) + orb_dot(q, r) + orb_dot(r, p));
   }
-  return area < 6 * M_PI; /* it is a multiple of 4π */
+  return (int32_t)lround(area / (4 * M_PI));
 }
 
 /* Symmetric Dirichlet energy of the triangle of a spoke of v; 1: isometric. */

@@ -80,9 +80,9 @@ ORB_MUST_CHECK orb_status orb_map_level_locate_all(orb_context *ctx, orb_map_lev
 /* The number of flipped triangles. */
 int32_t orb_map_level_flips(const orb_map_level *level);
 
-/* Does a level without flips cover the sphere once? A fold that clearing has drawn over half of the sphere covers it
- * twice, with every triangle positive. */
-int orb_map_level_covers_once(const orb_map_level *level);
+/* How many times a level covers the sphere; flipped triangles count against it. 1: once, as a map does. A triangle that
+ * is drawn over half of the sphere changes it, and a level without flips may cover the sphere twice. */
+int32_t orb_map_level_degree(const orb_map_level *level);
 
 /* Marks the vertices of the triangles whose symmetric Dirichlet energy is above a limit, and clears the other marks.
  * Returns the number of these triangles. */

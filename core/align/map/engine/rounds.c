@@ -60,6 +60,30 @@ void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_
   }
 }
 
+/* Clears the flips of a level, by untangling and then by unfolding what is left. *flips: those left, and the level is
+ * as it was if there are any. Either may draw a triangle over half of the sphere, and then all flips go, but the level
+ * covers the sphere twice. So a step that does this to a level that covered it once is undone. */
+static orb_status clear_now(orb_map_run *c, orb_map_level *l, double *copy, int32_t *flips) {
+  const orb_map_params *params = &c->params;
+  const size_t size = 3 * (size_t)l->count * sizeof *copy;
+  const int32_t before = *flips, degree = orb_map_level_degree(l);
+  memcpy(copy, l->x, size);
+  ORB_TRY(orb_map_level_untangle(c->ctx, l, flips, &c->work));
+  if (degree == 1 && orb_map_level_degree(l) != 1) {
+    memcpy(l->x, copy, size);
+    *flips = before;
+  }
+  if (*flips && *flips <= l->triangle_count / (c->given_target ? params->clear.hopeless : params->clear.unfold)) {
+    ORB_TRY(orb_map_level_unfold(c->ctx, l, flips));
+    *flips = degree == 1 && orb_map_level_degree(l) != 1 ? before : *flips;
+  }
+  if (*flips) {
+    memcpy(l->x, copy, size);
+    return ORB_OK;
+  }
+  return orb_map_level_locate_all(c->ctx, l, &c->b, 0);
+}
+
 orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier, int rounds, int32_t *flips) {
   const orb_map_params *params = &c->params;
   orb_map_rules rules = soft_rules(params, barrier);
@@ -76,17 +100,8 @@ orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier,
       break; /* a stronger barrier makes more flips: large parts are folded */
     }
     if (*flips) {
-      memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
-      ORB_GO(status, orb_map_level_untangle(c->ctx, l, flips, &c->work), done);
-      if (*flips && *flips <= l->triangle_count / (c->given_target ? params->clear.hopeless : params->clear.unfold)) {
-        ORB_GO(status, orb_map_level_unfold(c->ctx, l, flips), done);
-      }
-      if (*flips) {
-        most = *flips <= params->untangle.few ? 2 * rounds : rounds; /* too near to give up */
-        memcpy(l->x, copy, 3 * (size_t)l->count * sizeof *copy);
-      } else {
-        ORB_GO(status, orb_map_level_locate_all(c->ctx, l, &c->b, 0), done);
-      }
+      ORB_GO(status, clear_now(c, l, copy, flips), done);
+      most = *flips && *flips <= params->untangle.few ? 2 * rounds : rounds; /* too near to give up */
     }
   }
 done:

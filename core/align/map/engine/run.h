@@ -56,6 +56,7 @@ typedef struct orb_map_run {
   int wants_course;           /* they are */
   const double *given_target; /* for registrations without samples, in the fixed shape's space; NULL: computed */
   int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
+  int starts_smooth;          /* the first start from given targets has followed smoothed ones */
   double *target;             /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
