@@ -325,6 +325,9 @@ static orb_status follow_map(registration *r) {
 static orb_status follow_places(registration *r, int rounds, double first, double last) {
   for (int i = 0; i < rounds; i++) {
     double done = (double)i / (rounds - 1), reach = first * pow(last / first, done);
+    if (r->is_alone) { /* elsewhere the caller's loops check */
+      ORB_TRY(orb_context_check(r->ctx));
+    }
     clear_pulls(r);
     if (r->map && done < FADED) {
       pull_by_map(r, MAP_SHARE / (MAP_REACH * MAP_REACH) * (1 - done / FADED), OUTLIER_PLACE);

@@ -229,9 +229,9 @@ static void crumples_are_ironed(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(angles_are_kept), cmocka_unit_test(true_places_stay),    cmocka_unit_test(outliers_come_back),
-      cmocka_unit_test(doubted_places_come_back),
-      cmocka_unit_test(folds_open),      cmocka_unit_test(crumples_are_ironed),
+      cmocka_unit_test(angles_are_kept),    cmocka_unit_test(true_places_stay),
+      cmocka_unit_test(outliers_come_back), cmocka_unit_test(doubted_places_come_back),
+      cmocka_unit_test(folds_open),         cmocka_unit_test(crumples_are_ironed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

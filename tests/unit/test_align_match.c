@@ -107,6 +107,33 @@ static void others_differ(void **state) {
   orb_context_destroy(ctx);
 }
 
+/* Another map that is chosen takes the place of the best one, which becomes the first of the others, and the target
+ * becomes its own. */
+static void another_map_is_chosen(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_match match;
+  double *target;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, reach, 4, 1);
+  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
+  assert_in_range(match.other_count, 1, ORB_MATCH_OTHERS);
+  const int32_t last = match.other_count - 1;
+  const orb_match_pairs best = match.pairs, chosen = match.other[last].pairs;
+  assert_int_equal(orb_match_other_target(ctx, &match, last, &target), ORB_OK);
+  assert_memory_not_equal(target, match.target, 3 * (size_t)b.vertex_count * sizeof *target);
+  assert_int_equal(orb_match_choose(ctx, &match, last, target, 0.25), ORB_OK);
+  assert_ptr_equal(match.target, target);
+  assert_memory_equal(&match.pairs, &chosen, sizeof chosen);
+  assert_memory_equal(&match.other[0].pairs, &best, sizeof best);
+  assert_true(match.clear == 0.25 && match.lead == 1);
+  assert_true(match.other[0].cost == 1);
+  orb_match_free(ctx, &match);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+  orb_context_destroy(ctx);
+}
+
 /* Confidence rises with the lead of the best map and falls with its bend and its energy. The odds of 3 + 1.5 are those
  * of a rigid match far ahead. */
 static void confidence_is_monotone(void **state) {
@@ -254,10 +281,13 @@ static void cow_to_animal(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(limbs_go_to_limbs),      cmocka_unit_test(others_differ),
-      cmocka_unit_test(confidence_is_monotone), cmocka_unit_test(symmetric_shapes_are_not_sure),
-      cmocka_unit_test(a_tie_is_shared),        cmocka_unit_test(man_to_armadillo),
-      cmocka_unit_test(cow_to_animal)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs),
+                                     cmocka_unit_test(others_differ),
+                                     cmocka_unit_test(another_map_is_chosen),
+                                     cmocka_unit_test(confidence_is_monotone),
+                                     cmocka_unit_test(symmetric_shapes_are_not_sure),
+                                     cmocka_unit_test(a_tie_is_shared),
+                                     cmocka_unit_test(man_to_armadillo),
+                                     cmocka_unit_test(cow_to_animal)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -192,37 +192,96 @@ static double potato(const double p[3]) {
   return r;
 }
 
-/* A potato slides over one that is taller, from a map that is pushed aside around one place. */
-static void a_slide_undoes_a_push(void **state) {
-  (void)state;
-  orb_mesh a = shape_ball(ctx, 4), b = shape_ball(ctx, 4), start = shape_ball(ctx, 4);
-  double before = 0, after = 0;
-  for (int32_t v = 0; v < a.vertex_count; v++) {
-    const double *d = a.positions + 3 * (size_t)v, angle = 0.3 * exp(-10 * (1 - d[0]));
+/* A potato, one that is taller, and a map between them that is pushed aside around one place. */
+typedef struct push {
+  orb_mesh a, b, start;
+} push;
+
+static void push_open(push *s) {
+  *s = (push){shape_ball(ctx, 4), shape_ball(ctx, 4), shape_ball(ctx, 4)};
+  for (int32_t v = 0; v < s->a.vertex_count; v++) {
+    const double *d = s->a.positions + 3 * (size_t)v, angle = 0.3 * exp(-10 * (1 - d[0]));
     const double turned[3] = {cos(angle) * d[0] - sin(angle) * d[1], sin(angle) * d[0] + cos(angle) * d[1], d[2]};
     const double r = potato(d), there = potato(turned);
     for (int k = 0; k < 3; k++) {
       const size_t at = 3 * (size_t)v + (size_t)k;
-      start.positions[at] = turned[k] * there * (k == 2 ? 1.2 : 1);
-      b.positions[at] *= r * (k == 2 ? 1.2 : 1);
-      a.positions[at] *= r;
+      s->start.positions[at] = turned[k] * there * (k == 2 ? 1.2 : 1);
+      s->b.positions[at] *= r * (k == 2 ? 1.2 : 1);
+      s->a.positions[at] *= r;
     }
   }
-  scale_to_sphere(&a);
-  scale_to_sphere(&b);
-  scale_to_sphere(&start);
-  for (int slid = 0; slid < 2; slid++) {
-    for (int32_t v = 0; v < a.vertex_count; v++) {
-      const double away = distance(start.positions + 3 * (size_t)v, b.positions + 3 * (size_t)v);
-      *(slid ? &after : &before) = fmax(slid ? after : before, away);
-    }
-    assert_int_equal(slid ? ORB_OK : orb_elastic_slide(ctx, &a, &b, NULL, start.positions), ORB_OK);
+  scale_to_sphere(&s->a);
+  scale_to_sphere(&s->b);
+  scale_to_sphere(&s->start);
+}
+
+static void push_close(push *s) {
+  shape_free(ctx, &s->a);
+  shape_free(ctx, &s->b);
+  shape_free(ctx, &s->start);
+}
+
+/* How far the worst vertex is from its place. */
+static double push_left(const push *s) {
+  double most = 0;
+  for (int32_t v = 0; v < s->a.vertex_count; v++) {
+    most = fmax(most, distance(s->start.positions + 3 * (size_t)v, s->b.positions + 3 * (size_t)v));
   }
+  return most;
+}
+
+static void a_slide_undoes_a_push(void **state) {
+  (void)state;
+  push s;
+  push_open(&s);
+  const double before = push_left(&s);
+  assert_int_equal(orb_elastic_slide(ctx, &s.a, &s.b, NULL, s.start.positions), ORB_OK);
   assert_true(before > 0.3);
-  assert_true(after < 0.5 * before);
-  shape_free(ctx, &a);
-  shape_free(ctx, &b);
-  shape_free(ctx, &start);
+  assert_true(push_left(&s) < 0.5 * before);
+  push_close(&s);
+}
+
+/* The most pushed vertex is an anchor at its true place: it goes there, and its surroundings come along. */
+static void an_anchor_leads_a_slide(void **state) {
+  (void)state;
+  push free_one, held;
+  int32_t worst = 0;
+  double most = 0;
+  push_open(&free_one);
+  push_open(&held);
+  for (int32_t v = 0; v < held.a.vertex_count; v++) {
+    const double away = distance(held.start.positions + 3 * (size_t)v, held.b.positions + 3 * (size_t)v);
+    worst = away > most ? v : worst;
+    most = fmax(most, away);
+  }
+  orb_elastic_anchor one = {.vertex = worst};
+  memcpy(one.place, held.b.positions + 3 * (size_t)worst, sizeof one.place);
+  const orb_elastic_anchors anchors = {1, &one};
+  assert_int_equal(orb_elastic_slide(ctx, &free_one.a, &free_one.b, NULL, free_one.start.positions), ORB_OK);
+  assert_int_equal(orb_elastic_slide(ctx, &held.a, &held.b, &anchors, held.start.positions), ORB_OK);
+  assert_true(distance(held.start.positions + 3 * (size_t)worst, one.place) < 0.05 * most);
+  assert_true(push_left(&held) < push_left(&free_one));
+  push_close(&free_one);
+  push_close(&held);
+}
+
+/* The result has the same bytes for any number of threads. */
+static void a_slide_is_the_same_on_any_threads(void **state) {
+  (void)state;
+  push s[2];
+  for (int i = 0; i < 2; i++) {
+    const orb_context_options config = {.threads = i == 0 ? 1 : 3};
+    orb_context *own, *before = ctx;
+    push_open(&s[i]);
+    assert_int_equal(orb_context_create(&config, &own), ORB_OK);
+    ctx = own;
+    assert_int_equal(orb_elastic_slide(ctx, &s[i].a, &s[i].b, NULL, s[i].start.positions), ORB_OK);
+    ctx = before;
+    orb_context_destroy(own);
+  }
+  assert_memory_equal(s[0].start.positions, s[1].start.positions, 3 * (size_t)s[0].a.vertex_count * sizeof(double));
+  push_close(&s[0]);
+  push_close(&s[1]);
 }
 
 /* A map of the wrong limbs bends more. */
@@ -380,6 +439,8 @@ int main(void) {
                                      cmocka_unit_test(a_bent_tube_is_found),
                                      cmocka_unit_test(anchors_reach_their_places),
                                      cmocka_unit_test(a_slide_undoes_a_push),
+                                     cmocka_unit_test(an_anchor_leads_a_slide),
+                                     cmocka_unit_test(a_slide_is_the_same_on_any_threads),
                                      cmocka_unit_test(wrong_limbs_bend),
                                      cmocka_unit_test(a_copy_is_matched),
                                      cmocka_unit_test(threads_change_nothing),

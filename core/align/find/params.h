@@ -70,9 +70,10 @@ enum {
 /* Distances shorter than this are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.
  */
 static const double ORB_FIND_HINT_FAR = 0.5;
-/* Shapes whose landmarks' distances differ by more than the second, as a mean logarithm, are not one shape in two poses:
- * people have 0.03 to 0.24, different animals 0.12 to 0.57. Above the first, where a walk came to a good or a fair map,
- * the match may bend the shapes by so much: there it bends people by up to 0.13, different animals by 0.16 and more. */
+/* Shapes whose landmarks' distances differ by more than the second, as a mean logarithm, are not one shape in two
+ * poses: people have 0.03 to 0.24, different animals 0.12 to 0.57. Above the first, where a walk came to a good or a
+ * fair map, the match may bend the shapes by so much: there it bends people by up to 0.13, different animals by 0.16
+ * and more. */
 static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0.25, ORB_FIND_HINT_BEND = 0.15;
 /* A rough map that takes landmarks farther from their partners than this, in the mean, is another one. In radii of a
  * ball of the shape's area. */
