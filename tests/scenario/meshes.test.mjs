@@ -240,6 +240,10 @@ test('a refusal of a bad mesh says what is wrong and where', async (t) => {
   assert.match((await refused(grown(1, 1e9), 422, 'degenerate')).detail, /move it to the origin/);
   const line = await refused(obj(m).replace(/\nf (\d+)/, '\nf 99999'), 400, 'malformed-mesh');
   assert.equal(line.line, m.positions.length + 1);
+  assert.doesNotMatch(line.detail, /fill_holes/);
+  const faces = obj(m).trimEnd().split('\n');
+  const ends = await refused(faces.slice(0, -1).concat('f 1').join('\n'), 400, 'malformed-mesh');
+  assert.match(ends.detail, /ends within this line.*delete this line and send what is left with repair=fill_holes/);
   const cut = await refused(shapes.binaryPly(m).subarray(0, -20), 400, 'malformed-mesh');
   assert.ok(cut.offset > 0 || cut.line > 0);
   await refused('v 0 0 0\nv 1 0 0\nv 0 1 0\n', 400, 'malformed-mesh');
