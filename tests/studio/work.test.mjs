@@ -151,6 +151,10 @@ test('a reload and the URL alone restore the same state', async () => {
     'it looks the same',
   );
   const address = first.page.url();
+  await seek(first.page, 0.5);
+  await first.page.reload();
+  await until(() => button(first.page, 'Play').count(), 'the morph is back');
+  assert.equal(await time(first.page), 0.5, 'a reload at once, before the URL is written');
   await first.done();
 
   const second = await openPage(browser, daemon.url, { hash: new URL(address).hash });

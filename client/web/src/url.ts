@@ -166,17 +166,52 @@ function save() {
   clearTimeout(timer);
   timer = window.setTimeout(() => {
     timer = 0;
-    if (restoring) return;
-    const text = encode();
-    const bare = text.replace(/&?cam=[^&]*/, '');
-    const next = bare || state.shapes.length ? `#${text}` : '';
-    if (next === written) return;
-    written = next;
-    history.replaceState(null, '', next || location.pathname + location.search);
+    if (!restoring) write(hash());
   }, REST);
 }
 
+/** The part of the URL that says what the page shows. */
+function hash(): string {
+  const text = encode();
+  const bare = text.replace(/&?cam=[^&]*/, '');
+  return bare || state.shapes.length ? `#${text}` : '';
+}
+
+function write(next: string) {
+  if (next === written) return;
+  written = next;
+  history.replaceState(null, '', next || location.pathname + location.search);
+}
+
+/** What the page shows, if it goes away before that is in its URL: a page that reloads has the URL of before. */
+const LATE = 'orbmorph.late';
+
+function keepLate() {
+  if (!timer || restoring || location.hash !== written) return; // another URL has been pasted
+  try {
+    sessionStorage.setItem(LATE, JSON.stringify({ from: location.hash, to: hash() }));
+  } catch {
+    // without storage, the last second is lost
+  }
+}
+
+/** After a reload, and on the way back: brings the URL up to date. */
+function takeLate() {
+  try {
+    const late = sessionStorage.getItem(LATE);
+    sessionStorage.removeItem(LATE);
+    const [navigation] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
+    if (!late || navigation?.type === 'navigate') return;
+    const { from, to } = JSON.parse(late);
+    if (from === written) write(to);
+  } catch {
+    // there is no storage
+  }
+}
+
 export async function restore() {
+  written = location.hash;
+  takeLate();
   const query = new URLSearchParams(location.hash.slice(1).replace(/\+/g, '%2B'));
   restoring = true;
   let next: Matches | undefined;
@@ -255,6 +290,7 @@ export function keepUrl() {
   watch(save);
   player.listen(() => state.playing || save()); // a playing morph has no time in its URL
   stage.onMoved = save;
+  window.addEventListener('pagehide', keepLate);
   window.addEventListener('hashchange', () => {
     if (location.hash !== written) location.reload();
   });
