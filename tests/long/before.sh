@@ -31,7 +31,7 @@ END
 chmod +x "$at/orbmorphd"
 wait=${ORB_BEFORE_WAIT:-20}
 export ORBMORPHD=$at/orbmorphd ORB_DAEMON=$at/orbmorphd ORBMORPH=${ORBMORPH:-$PWD/build/bin/orbmorph}
-export ORB_PATIENCE=${wait}000 ORB_LIMIT=${wait}000
+export ORB_PATIENCE=${wait}000 ORB_LIMIT=${wait}000 ORB_BEFORE=1
 for name in "$@"; do
   [[ $name == *.* ]] || name=scenario.$name
   echo "== $name"

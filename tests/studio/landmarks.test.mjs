@@ -169,6 +169,14 @@ test('landmarks are found', async () => {
   const found = Number(text.match(/^(\d+) landmarks found/)?.[1] ?? 0);
   assert.equal(await landmarks(page).count(), found);
   assert.ok(found > 0 || /matched/.test(text), text);
+  // a job that has no name yet
+  await button(page, 'Clear').click();
+  let asked = 0;
+  await page.route('**/v1/supermeshes', (route) => asked++ && route.continue()); // the first one gets no answer
+  await button(page, 'Find them for me').click();
+  await until(() => asked, 'the search is sent');
+  await page.reload();
+  await counted(landmarks(page), found, 'the search goes on after a reload');
   await done();
 });
 

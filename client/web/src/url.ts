@@ -1,9 +1,9 @@
 /**
  * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
- * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), go=1: the job is sent once the fast
- * one is computed, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
- * cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: of its materials, e: the weights of its
+ * m: meshes on the server, r: a supermesh, j: a job, find=1: one that finds landmarks, go=1: one that makes the morph, where
+ * it has no id yet, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l:
+ * landmarks (a vertex or x_y_z for each shape), cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: of its materials, e: the weights of its
  * targets that are not shapes.
  */
 import type { Place } from 'orbmorph';
@@ -119,8 +119,8 @@ function encode(): string {
   if (state.tab !== 'shapes') put('tab', state.tab);
   put('r', state.result?.supermesh.id ?? '');
   put('j', state.running?.job?.id ?? '');
-  if (state.running?.job && state.running.purpose === 'find') put('find', '1');
-  if (state.running?.fast && !state.running.job) put('go', '1');
+  if (state.running?.purpose === 'find') put('find', '1');
+  else if (state.running && !state.running.job && !state.running.matches) put('go', '1');
   put('q', encodeMatch());
   if (state.result && !state.playing) put('t', player.time.toFixed(3));
   put(
@@ -282,6 +282,7 @@ export async function restore() {
   }
   const job = query.get('j');
   if (job) void resumeJob(job, query.get('find') ? 'find' : 'morph', next);
+  else if (query.get('find')) void startMerge('find');
   else if (query.get('go')) void startMerge();
 }
 
