@@ -149,6 +149,17 @@ test('pieces of one name are told apart, and each can be kept', async () => {
   await done();
 });
 
+test('a repaired file keeps its materials', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const file = { name: 'body.glb', mimeType: 'model/gltf-binary', buffer: rigged().bytes };
+  await page.locator('input[type=file]').first().setInputFiles(file);
+  const blue = () => countPixels(page, '.pane-view', (r, g, b) => b > r + 30 && b > g + 20);
+  await button(page, 'Keep the largest piece').click();
+  await mended(page, 'body');
+  assert.ok((await blue()) > 2000, 'the lower half of the body is blue');
+  await done();
+});
+
 test('the loop around a handle is shown in red, and the handle can be closed', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const file = { name: 'ring.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(torus())) };

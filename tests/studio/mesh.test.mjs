@@ -17,7 +17,7 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress', 'others']
+      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress', 'others', 'mended']
         .map((name) => `export * from './${name}.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
@@ -491,6 +491,56 @@ test('repairs add up; a piece replaces the largest, and a size another size', ()
     ['safe', 'none', 'none'],
   ];
   for (const [list, more, expected] of cases) assert.equal(mesh.withRepairs(list, more), expected);
+});
+
+test('a repaired mesh: triangles of the file keep its look, patches are plain', () => {
+  const { positions, triangles } = ball(1);
+  const image = Buffer.from('not decoded here');
+  // every triangle has vertices of its own, as along seams; the first two are missing
+  const corners = triangles.slice(2).flat();
+  const raw = {
+    format: 'glb',
+    positions: Float64Array.from(corners.flatMap((v) => positions[v])),
+    corners: Uint32Array.from(corners.keys()),
+    dress: {
+      uv: Float32Array.from(corners.flatMap((_, i) => [i, -i])),
+      dye: null,
+      cover: Uint16Array.from(corners, (_, i) => (i < 30 ? 0 : 1)),
+      covers: [0, 1].map((n) => ({ base: [n, 0, 0], image: n - 1, wrap: [10497, 10497], cutoff: 0 })),
+      images: [image],
+    },
+  };
+  // what the daemon has: welded, some triangles begin with another corner, and a patch with a vertex of its own
+  const middle = positions.length;
+  const [[a, b, c]] = triangles;
+  const repaired = {
+    format: 'ply',
+    positions: Float64Array.from([...positions, [9, 9, 9]].flat()),
+    corners: Uint32Array.from(
+      [...triangles.slice(2).map(([p, q, r], i) => (i % 2 ? [q, r, p] : [p, q, r])), [a, b, middle], [a, b, c]].flat(),
+    ),
+    properties: new Map([
+      ['source', Float64Array.from([...positions.keys()].map((v) => corners.indexOf(v)).concat(-1))],
+    ]),
+  };
+  const { raw: made, added } = mesh.mendedMesh(repaired, raw);
+  assert.equal(added, corners.length);
+  const kept = triangles.length - 2;
+  for (let t = 0; t < kept + 2; t++)
+    for (let k = 0; k < 3; k++) {
+      const v = made.corners[3 * t + k];
+      const at = [...made.positions.subarray(3 * v, 3 * v + 3)];
+      const from = repaired.corners[3 * t + k];
+      assert.deepEqual(at, [...repaired.positions.subarray(3 * from, 3 * from + 3)]);
+      if (t < kept) assert.equal(v, 3 * t + ((t % 2 ? k + 1 : k) % 3), 'the corner of the file');
+      else assert.ok(v >= added && made.dress.covers[made.dress.cover[v]].image === -1, 'plain');
+      assert.equal(made.dress.uv[2 * v], t < kept ? v : 0);
+    }
+  assert.equal(made.dress.cover[made.corners[0]], 0);
+  assert.equal(made.dress.cover[made.corners[3 * kept - 1]], 1);
+  assert.deepEqual(made.dress.images, [image]);
+  // of a file that only the daemon can read, the numbers alone are known
+  assert.equal(mesh.mendedMesh(repaired, undefined).raw.dress, undefined);
 });
 
 test('a kept document: the new targets, in the scene, then those that it had, and the meshes that stay', () => {
