@@ -37,8 +37,10 @@ for name in "$@"; do
   echo "== $name"
   timeout "$seconds" node --test --test-timeout="${seconds}000" ${ORB_BEFORE_TESTS:+"--test-name-pattern=$ORB_BEFORE_TESTS"} \
     "tests/${name/.//}.test.mjs" >"$at/out" 2>&1 || [ $? -ne 124 ] || echo "not ok: stopped after $seconds s"
-  awk '/^# Subtest:/ { test = substr($0, 12) }
-    /^(not )?ok / { print }
-    /^  error:/ { want = 1; rest = $0; sub(/^ *error: */, "", rest); if (rest != "|-") { print "    " rest; want = 0 }; next }
-    want && NF { sub(/^ +/, ""); print "    " substr($0, 1, 200); want = 0 }' "$at/out"
+  # of each failure, the first three lines of its error: what was expected, and what was waited for
+  awk '/^(not )?ok / { print }
+    /^  error:/ { left = 3; sub(/^ *error: */, ""); sub(/^\|-$/, "") }
+    /^  code:/ { left = 0 }
+    { gsub(/\033\[[0-9;]*m/, ""); sub(/^ +/, "") }
+    left && NF && !/^(=+|Call log:$)/ { print "    " substr($0, 1, 200); left-- }' "$at/out"
 done

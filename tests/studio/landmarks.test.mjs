@@ -180,8 +180,8 @@ test('landmarks are found', async () => {
   await done();
 });
 
-test('a search for landmarks survives a reload as itself, and can be stopped', async () => {
-  const busy = await startOccupied();
+test('a search for landmarks survives a reload as itself, and can be stopped', async (t) => {
+  const busy = await startOccupied(t);
   const { page, done } = await openPage(browser, busy.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await button(page, 'Landmarks').click();
@@ -195,5 +195,4 @@ test('a search for landmarks survives a reload as itself, and can be stopped', a
   await until(async () => (await json(busy.url, search.url)).state === 'cancelled', 'its job, too');
   assert.equal(await page.evaluate(() => document.activeElement.textContent), 'Find them for me', 'the focus stays');
   await done();
-  await busy.stop();
 });

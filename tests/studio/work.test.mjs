@@ -210,9 +210,9 @@ test('a file without a mesh is refused with an explanation', async () => {
   await done();
 });
 
-test('a morph is cancelled before it is done', async () => {
+test('a morph is cancelled before it is done', async (t) => {
   // The morph cannot finish before it is cancelled.
-  const busy = await startOccupied();
+  const busy = await startOccupied(t);
   const { page, done } = await openPage(browser, busy.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await page.getByText('Options', { exact: true }).click();
@@ -225,7 +225,6 @@ test('a morph is cancelled before it is done', async () => {
   await until(async () => (await json(busy.url, morph.url)).state === 'cancelled', 'the job has stopped');
   await button(page, /^Morph 2 shapes$/).waitFor();
   await done();
-  await busy.stop();
 });
 
 test('a job continues when the page is closed, and is found again', async () => {
