@@ -37,9 +37,9 @@ for name in "$@"; do
   echo "== $name"
   timeout "$seconds" node --test --test-timeout="${seconds}000" ${ORB_BEFORE_TESTS:+"--test-name-pattern=$ORB_BEFORE_TESTS"} \
     "tests/${name/.//}.test.mjs" >"$at/out" 2>&1 || [ $? -ne 124 ] || echo "not ok: stopped after $seconds s"
-  # of each failure, the first three lines of its error: what was expected, and what was waited for
+  # of each failure, the first four lines of its error: what was expected, and what was waited for
   awk '/^(not )?ok / { print }
-    /^  error:/ { left = 3; sub(/^ *error: */, ""); sub(/^\|-$/, "") }
+    /^  error:/ { left = 4; sub(/^ *error: */, ""); sub(/^\|-$/, "") }
     /^  code:/ { left = 0 }
     { gsub(/\033\[[0-9;]*m/, ""); sub(/^ +/, "") }
     left && NF && !/^(=+|Call log:$)/ { print "    " substr($0, 1, 200); left-- }' "$at/out"
