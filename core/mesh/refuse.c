@@ -91,7 +91,8 @@ orb_status orb_refuse_facing(orb_surface *s) {
       s->conflict >= 0
           ? orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
                      "The surface has one side only, like a Möbius strip: no facing suits all of its faces. "
-                     "A walk from neighbour to neighbour returns reversed at the edge given.")
+                     "A walk from neighbour to neighbour returns reversed at the edge given. Cut the surface there, "
+                     "and close it.")
           : orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
                      "Faces are reversed against their neighbours at %lld %s; send the mesh with repair=safe, or "
                      "reverse them.",

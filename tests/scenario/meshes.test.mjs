@@ -228,6 +228,20 @@ test('a refusal of a bad mesh says what is wrong and where', async (t) => {
     'not-orientable',
     { repair: 'none' },
   );
+  // a Möbius strip: after 12 quads, upper and lower vertex have changed places
+  const strip = { positions: [], triangles: [] };
+  for (let i = 0; i < 12; i++) {
+    const [across, along] = [(Math.PI * i) / 12, (Math.PI * i) / 6];
+    for (const side of [-0.3, 0.3]) {
+      const away = 1 + side * Math.cos(across);
+      strip.positions.push([away * Math.cos(along), away * Math.sin(along), side * Math.sin(across)]);
+    }
+    const [a, b, c, d] = [2 * i, 2 * i + 1, ...(i < 11 ? [2 * i + 2, 2 * i + 3] : [1, 0])];
+    strip.triangles.push([a, c, b], [b, c, d]);
+  }
+  const twisted = await refused(strip, 422, 'not-orientable');
+  assert.equal(twisted.edges.length, 1);
+  assert.match(twisted.detail, /one side only.*Cut the surface there, and close it\.$/);
   await refused(obj(m).replace('v 1 0 0', 'v nan 0 0'), 422, 'not-finite');
   const grown = (scale, shift = 0) => ({ ...m, positions: m.positions.map((p) => p.map((x) => x * scale + shift)) });
   for (const scale of [1.1e30, 1e100, 1e150, 1e200, 1e308]) {
