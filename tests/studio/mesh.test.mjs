@@ -286,6 +286,66 @@ test('glTF: accessors of all primitives one after another, after node transforms
   assert.deepEqual([...raw.corners], [...FACES.flat(), ...FACES.flat().map((v) => v + 4)]);
 });
 
+test('glTF: strips and fans, sparse and quantized accessors', () => {
+  // the tetrahedron as a strip that repeats a vertex, as a fan and a triangle, and as triangles without indices
+  const lists = [
+    [0, 2, 1, 3, 0, 0, 2],
+    [0, 2, 1, 3, 2],
+    [1, 2, 3],
+  ];
+  const integers = Int16Array.from([...TETRAHEDRON.flat().map((x) => 32767 * x), ...Array(12).fill(0)]);
+  const values = Float32Array.from(TETRAHEDRON.slice(1).flat());
+  const parts = [integers, Uint16Array.from([1, 2, 3, 0]), values, ...lists.map((l) => Uint16Array.from([...l, 0]))];
+  const blocks = parts.map((list) => Buffer.from(list.buffer));
+  let at = 0;
+  const bufferViews = blocks.map(({ length }) => ({
+    buffer: 0,
+    byteOffset: (at += length) - length,
+    byteLength: length,
+  }));
+  const sparse = { count: 3, indices: { bufferView: 1, componentType: 5123 }, values: { bufferView: 2 } };
+  const json = {
+    asset: { version: '2.0' },
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }],
+    meshes: [
+      {
+        primitives: [
+          { attributes: { POSITION: 0 }, indices: 2, mode: 5 },
+          { attributes: { POSITION: 1 }, indices: 3, mode: 6 },
+          { attributes: { POSITION: 1 }, indices: 4 },
+          { attributes: { POSITION: 0 }, mode: 1 },
+        ],
+      },
+    ],
+    accessors: [
+      { bufferView: 0, componentType: 5122, normalized: true, count: 4, type: 'VEC3' },
+      { componentType: 5126, count: 4, type: 'VEC3', sparse },
+      ...lists.map((l, i) => ({ bufferView: 3 + i, componentType: 5123, count: l.length, type: 'SCALAR' })),
+    ],
+    bufferViews,
+    buffers: [
+      { byteLength: at, uri: `data:application/octet-stream;base64,${Buffer.concat(blocks).toString('base64')}` },
+    ],
+  };
+  const raw = mesh.parseMesh(text(JSON.stringify(json)));
+  assert.deepEqual(
+    [...raw.positions],
+    [0, 1, 2].flatMap(() => TETRAHEDRON.flat()),
+  );
+  const found = [];
+  for (let i = 0; i < raw.corners.length; i += 3) found.push([...raw.corners.subarray(i, i + 3)]);
+  assert.deepEqual(found, [
+    [0, 2, 1],
+    [2, 3, 1],
+    [1, 3, 0],
+    [6, 5, 4],
+    [5, 7, 4],
+    [7, 6, 4],
+    [9, 10, 11],
+  ]);
+});
+
 test('what cannot be drawn is omitted, and invalid files do not throw', () => {
   const raw = mesh.parseMesh(text('v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\nf 1 2 4\nf 1 2 3\nf 1 2 9\n'));
   assert.deepEqual([...raw.corners], [0, 1, 3]);
