@@ -213,7 +213,7 @@ orb_status orb_refuse_handles(orb_surface *s, int64_t genus, double limit) {
   }
   orb_error *error = orb_context_error_edit(s->ctx);
   error->genus = genus;
-  for (int32_t i = 0; i < loops.count && i < ORB_ERROR_ITEMS; i++) {
+  for (int32_t i = 0; i < loops.count; i++) {
     int32_t at = error->loop_start[error->loop_count], count = loops.loop[i].count;
     if (count > ORB_ERROR_LOOP_VERTICES - at) {
       continue; /* a shorter one may fit */
