@@ -187,9 +187,10 @@ function write(next: string) {
 const LATE = 'orbmorph.late';
 
 function keepLate() {
-  if (!timer || restoring || location.hash !== written) return; // another URL has been pasted
+  const late = timer && !restoring && location.hash === written; // else another URL has been pasted
   try {
-    sessionStorage.setItem(LATE, JSON.stringify({ from: location.hash, to: hash() }));
+    if (late) sessionStorage.setItem(LATE, JSON.stringify({ from: written, to: hash() }));
+    else sessionStorage.removeItem(LATE);
   } catch {
     // without storage, the last second is lost
   }
