@@ -6,10 +6,13 @@
 #include "http.h"
 #include "input.h"
 #include "mesh.h"
+#include "problem.h"
 #include "report.h"
 #include "resource.h"
 #include "terminal.h"
 #include "text.h"
+
+#define NO_MESH "0000000000000000000000000000000000000000000000000000000000000000" /* no file has this hash */
 
 static void set_text(const cli *c, cJSON *request, cli_option_id option, const char *path) {
   if (c->args.value[option]) {
@@ -138,6 +141,30 @@ static int make_request(cli *c, cJSON **out) {
   return add_options(c, request);
 }
 
+/* The daemon checks, before any upload, what only it can check. It gets the request with meshes that do not exist, and
+ * reads all of it before it looks for them. */
+static int ask_daemon(cli *c, const cJSON *request) {
+  if (cJSON_GetArraySize(request) == 1) {
+    return CLI_DONE; /* nothing but the shapes */
+  }
+  cJSON *copy = cJSON_Duplicate(request, 1), *shapes = cJSON_GetObjectItemCaseSensitive(copy, "shapes");
+  for (int i = 0; i < c->args.operand_count; i++) {
+    cJSON *shape = cJSON_CreateObject();
+    cJSON_AddStringToObject(shape, "mesh", NO_MESH);
+    cJSON_AddItemToArray(shapes, shape);
+  }
+  char *text = cJSON_PrintUnformatted(copy);
+  cli_reply reply = {0};
+  int rc = cli_send(c, &(cli_request){.method = "POST", .path = "/v1/supermeshes", .json = text}, &reply);
+  if (rc == CLI_DONE && reply.status != 404) {
+    rc = cli_refused(c, NULL, &reply);
+  }
+  cli_reply_free(&reply);
+  free(text);
+  cJSON_Delete(copy);
+  return rc;
+}
+
 static int add_shapes(cli *c, cJSON *request) {
   cJSON *shapes = cJSON_GetObjectItemCaseSensitive(request, "shapes");
   for (int i = 0; i < c->args.operand_count; i++) {
@@ -192,6 +219,9 @@ static int merge(cli *c, const char *output) {
   }
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     rc = cli_check_mesh(c, c->args.operands[i]);
+  }
+  if (rc == CLI_DONE) {
+    rc = ask_daemon(c, request);
   }
   if (rc == CLI_DONE) {
     rc = add_shapes(c, request);

@@ -76,8 +76,8 @@ const char *cli_advice(const char *type) {
        "the "
        "surface there."},
       {"not-orientable",
-       "The faces cannot all point outward: the surface is one-sided or, with --repair none, its faces "
-       "are not consistently oriented. Recalculate the normals, or upload with --repair safe."},
+       "The faces cannot all point outward. Cut a surface that has one side only at the edge above, and close it. "
+       "Faces that --repair none leaves reversed: recalculate the normals, or upload with --repair safe."},
       {"not-connected",
        "The file holds several pieces. Join them into one closed surface, upload each piece by itself, or "
        "keep one: --repair largest_component keeps the largest, --take-part another."},

@@ -13,8 +13,21 @@ typedef struct obj_reader {
   int has_library; /* a "mtllib" has been noted */
 } obj_reader;
 
+/* The file ends within the line that is being read, as it does where a download was interrupted. */
+static int is_cut(const orb_text *text) {
+  const unsigned char *p = text->at;
+  while (p < text->end && !orb_is_eol(*p)) {
+    p++;
+  }
+  return p == text->end;
+}
+
 static orb_status malformed(obj_reader *r, const char *what) {
-  return orb_build_malformed(r->build.ctx, 1, r->text.line, "%s", what);
+  return orb_build_malformed(r->build.ctx, 1, r->text.line, "%s%s", what,
+                             is_cut(&r->text) ? " The file ends within this line, so its rest is probably missing: "
+                                                "download or export it again. If you cannot, delete this line and "
+                                                "send what is left with repair=fill_holes."
+                                              : "");
 }
 
 static orb_status read_vertex(obj_reader *r) {

@@ -26,7 +26,7 @@
 /* Short loops are cheaper to find: searches begin with an eighth of the limit, and double it. */
 static const double FIRST_LIMIT = 0.125;
 /* Rounds in which loops are searched that an error shows; each costs some searches of the whole surface. */
-enum { LIST_ROUNDS = 12 };
+enum { LIST_ROUNDS = 24 };
 
 void orb_loops_free(orb_context *ctx, orb_loops *loops) {
   orb_free(ctx, loops->loop);
@@ -236,7 +236,8 @@ static orb_status names_twice(orb_surface *s, const orb_loops *loops, int *twice
 
 orb_status orb_surface_list_handles(orb_surface *s, int64_t genus, orb_loops *out) {
   double facing, diagonal = diagonal_of(s->mesh, &facing), area[64];
-  for (int round = 0; round < LIST_ROUNDS && genus > 0 && out->count < ORB_ERROR_ITEMS; round++) {
+  int32_t most = genus > ORB_ERROR_LOOPS ? ORB_ERROR_ITEMS : ORB_ERROR_LOOPS; /* a part need not cost more */
+  for (int round = 0; round < LIST_ROUNDS && genus > 0 && out->count < most; round++) {
     orb_cycles cycles = {0};
     orb_status status = orb_cycles_find(s, INFINITY, 64, &cycles);
     for (int32_t i = 0; i < cycles.count && status == ORB_OK; i++) {
@@ -260,5 +261,6 @@ orb_status orb_surface_list_handles(orb_surface *s, int64_t genus, orb_loops *ou
       break;
     }
   }
+  out->count = out->count < most ? out->count : most;
   return ORB_OK;
 }

@@ -17,9 +17,9 @@ void orb_loops_free(orb_context *ctx, orb_loops *loops);
  * handles; *genus: what is left. */
 ORB_MUST_CHECK orb_status orb_surface_close_handles(orb_surface *surface, double size, int64_t *genus);
 
-/* Finds a loop for each handle, at most ORB_ERROR_ITEMS: closed, each vertex once, along edges of the file, and such
- * that a cut along it leaves the surface connected, which proves that it is not contractible. Cuts the surface, which
- * the caller can only free afterwards. */
+/* Finds a loop for each handle: closed, each vertex once, along edges of the file, and such that a cut along it leaves
+ * the surface connected, which proves that it is not contractible. Of more than ORB_ERROR_LOOPS handles, only
+ * ORB_ERROR_ITEMS get one. Cuts the surface, which the caller can only free afterwards. */
 ORB_MUST_CHECK orb_status orb_surface_list_handles(orb_surface *surface, int64_t genus, orb_loops *out);
 
 #endif

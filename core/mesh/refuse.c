@@ -91,7 +91,8 @@ orb_status orb_refuse_facing(orb_surface *s) {
       s->conflict >= 0
           ? orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
                      "The surface has one side only, like a Möbius strip: no facing suits all of its faces. "
-                     "A walk from neighbour to neighbour returns reversed at the edge given.")
+                     "A walk from neighbour to neighbour returns reversed at the edge given. Cut the surface there, "
+                     "and close it.")
           : orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
                      "Faces are reversed against their neighbours at %lld %s; send the mesh with repair=safe, or "
                      "reverse them.",
@@ -212,7 +213,7 @@ orb_status orb_refuse_handles(orb_surface *s, int64_t genus, double limit) {
   }
   orb_error *error = orb_context_error_edit(s->ctx);
   error->genus = genus;
-  for (int32_t i = 0; i < loops.count && i < ORB_ERROR_ITEMS; i++) {
+  for (int32_t i = 0; i < loops.count; i++) {
     int32_t at = error->loop_start[error->loop_count], count = loops.loop[i].count;
     if (count > ORB_ERROR_LOOP_VERTICES - at) {
       continue; /* a shorter one may fit */

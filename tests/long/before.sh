@@ -31,14 +31,16 @@ END
 chmod +x "$at/orbmorphd"
 wait=${ORB_BEFORE_WAIT:-20}
 export ORBMORPHD=$at/orbmorphd ORB_DAEMON=$at/orbmorphd ORBMORPH=${ORBMORPH:-$PWD/build/bin/orbmorph}
-export ORB_PATIENCE=${wait}000 ORB_LIMIT=${wait}000
+export ORB_PATIENCE=${wait}000 ORB_LIMIT=${wait}000 ORB_BEFORE=1
 for name in "$@"; do
   [[ $name == *.* ]] || name=scenario.$name
   echo "== $name"
   timeout "$seconds" node --test --test-timeout="${seconds}000" ${ORB_BEFORE_TESTS:+"--test-name-pattern=$ORB_BEFORE_TESTS"} \
     "tests/${name/.//}.test.mjs" >"$at/out" 2>&1 || [ $? -ne 124 ] || echo "not ok: stopped after $seconds s"
-  awk '/^# Subtest:/ { test = substr($0, 12) }
-    /^(not )?ok / { print }
-    /^  error:/ { want = 1; rest = $0; sub(/^ *error: */, "", rest); if (rest != "|-") { print "    " rest; want = 0 }; next }
-    want && NF { sub(/^ +/, ""); print "    " substr($0, 1, 200); want = 0 }' "$at/out"
+  # of each failure, the first four lines of its error: what was expected, and what was waited for
+  awk '/^(not )?ok / { print }
+    /^  error:/ { left = 4; sub(/^ *error: */, ""); sub(/^\|-$/, "") }
+    /^  code:/ { left = 0 }
+    { gsub(/\033\[[0-9;]*m/, ""); sub(/^ +/, "") }
+    left && NF && !/^(=+|Call log:$)/ { print "    " substr($0, 1, 200); left-- }' "$at/out"
 done

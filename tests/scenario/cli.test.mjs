@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { createHash } from 'node:crypto';
-import { mkdir, readFile, writeFile, readdir, copyFile, stat } from 'node:fs/promises';
+import { copyFile, mkdir, readdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { folder, quoted, run, runProgram } from './support/cli.mjs';
@@ -248,6 +248,19 @@ test('nothing is uploaded before the options were checked and the output was tri
     const { code, err } = await run(['morph', dog, giraffe, ...more], { env, cwd: at });
     assert.equal(code, 2, `${more}: ${err}`);
   }
+  // what only the daemon knows
+  await writeFile(path.join(at, 'bent.json'), '[{"at":[{"vertex":1},{"vertex":-1}]}]');
+  for (const [more, why] of [
+    [['--set', 'remesh.colour=1'], /unknown-member: There is no member "colour"/],
+    [['--set', 'asset.holes=maybe'], /bad-option: "holes" in "asset" must be/],
+    [['--transfer', '1:fur'], /invalid-request: "what" of entry 0 of "transfer"/],
+    [['-l', path.join(at, 'bent.json')], /landmarks/],
+  ]) {
+    const { code, err } = await run(['morph', dog, giraffe, ...more], { env, cwd: at });
+    assert.equal(code, 1, `${more}: ${err}`);
+    assert.match(err, why);
+  }
+  await rm(path.join(at, 'bent.json'));
   assert.equal((await run(['embed', dog, '-o', path.join(at, 'none/x.ply')], { env })).code, 2);
   assert.deepEqual((await d.get('/v1/meshes')).json.meshes, []);
   assert.deepEqual(await readdir(at), ['one.json'], 'trying leaves nothing behind');

@@ -41,6 +41,21 @@ for (let i = 0; i < 5; i++) {
   );
 }
 
+/** Discs: a flat one, a bowl and a saddle. Each is one sheet. */
+for (const [name, height] of [
+  ['flat disc', () => 0],
+  ['shallow bowl', (x, y) => 0.3 * (x * x + y * y)],
+  ['saddle', (x, y) => 0.4 * (x * x - y * y)],
+])
+  open.push([
+    name,
+    cut(
+      shapes.ball(3, ([x, y]) => [x, y, height(x, y)]),
+      away([0, 0, -1], 89),
+    ),
+    1,
+  ]);
+
 /** A hole of more than 48 edges gets a surface with vertices of its own, which are omitted again as well. */
 const wide = ['bust with a wide hole', cut(shapes.egg(4), away([0.2, -1, 0.1], 70)), 1];
 open.push(wide);

@@ -228,6 +228,20 @@ test('a refusal of a bad mesh says what is wrong and where', async (t) => {
     'not-orientable',
     { repair: 'none' },
   );
+  // a Möbius strip: after 12 quads, upper and lower vertex have changed places
+  const strip = { positions: [], triangles: [] };
+  for (let i = 0; i < 12; i++) {
+    const [across, along] = [(Math.PI * i) / 12, (Math.PI * i) / 6];
+    for (const side of [-0.3, 0.3]) {
+      const away = 1 + side * Math.cos(across);
+      strip.positions.push([away * Math.cos(along), away * Math.sin(along), side * Math.sin(across)]);
+    }
+    const [a, b, c, d] = [2 * i, 2 * i + 1, ...(i < 11 ? [2 * i + 2, 2 * i + 3] : [1, 0])];
+    strip.triangles.push([a, c, b], [b, c, d]);
+  }
+  const twisted = await refused(strip, 422, 'not-orientable');
+  assert.equal(twisted.edges.length, 1);
+  assert.match(twisted.detail, /one side only.*Cut the surface there, and close it\.$/);
   await refused(obj(m).replace('v 1 0 0', 'v nan 0 0'), 422, 'not-finite');
   const grown = (scale, shift = 0) => ({ ...m, positions: m.positions.map((p) => p.map((x) => x * scale + shift)) });
   for (const scale of [1.1e30, 1e100, 1e150, 1e200, 1e308]) {
@@ -240,6 +254,10 @@ test('a refusal of a bad mesh says what is wrong and where', async (t) => {
   assert.match((await refused(grown(1, 1e9), 422, 'degenerate')).detail, /move it to the origin/);
   const line = await refused(obj(m).replace(/\nf (\d+)/, '\nf 99999'), 400, 'malformed-mesh');
   assert.equal(line.line, m.positions.length + 1);
+  assert.doesNotMatch(line.detail, /fill_holes/);
+  const faces = obj(m).trimEnd().split('\n');
+  const ends = await refused(faces.slice(0, -1).concat('f 1').join('\n'), 400, 'malformed-mesh');
+  assert.match(ends.detail, /ends within this line.*delete this line and send what is left with repair=fill_holes/);
   const cut = await refused(shapes.binaryPly(m).subarray(0, -20), 400, 'malformed-mesh');
   assert.ok(cut.offset > 0 || cut.line > 0);
   await refused('v 0 0 0\nv 1 0 0\nv 0 1 0\n', 400, 'malformed-mesh');

@@ -36,7 +36,7 @@ const skinned = (count) => (gltf, push) => {
 };
 
 const red = (page, view = '.pane-view') => countPixels(page, view, (r, g, b) => r > 90 && g < r / 2 && b < r / 2);
-const blue = (page) => countPixels(page, '.pane-view', (r, g, b) => b > 90 && r < b / 2 && g < b / 2);
+const blue = (page, view = '.pane-view') => countPixels(page, view, (r, g, b) => b > 90 && r < b / 2 && g < b / 2);
 
 /** Downloads the page of the shown morph, and opens it. */
 async function assertPage(page, check) {
@@ -128,5 +128,54 @@ test('a skin, targets and a texture of the second shape are taken by a tick each
   ]);
   await button(page, 'Remove egg').click();
   assert.equal(await offers.count(), 0, 'the first shape gives its own');
+  await done();
+});
+
+/** Makes the surface red, and its lower half blue strips: one for each triangle, joined by repeated vertices. */
+const striped =
+  ({ positions, triangles }) =>
+  (gltf, push) => {
+    const isLow = (t) => positions[t[0]][1] < 0;
+    const strip = triangles.filter(isLow).flatMap(([a, b, c], i) => (i ? [a, a, b, c, c, c] : [a, b, c, c, c]));
+    const add = (list) =>
+      gltf.accessors.push({
+        bufferView: push(Buffer.from(Uint16Array.from(list).buffer)),
+        componentType: 5123,
+        count: list.length,
+        type: 'SCALAR',
+      }) - 1;
+    const [{ attributes }] = gltf.meshes[0].primitives;
+    const paint = (baseColorFactor) => ({ pbrMetallicRoughness: { baseColorFactor } });
+    gltf.materials = [paint([0.9, 0.05, 0.05, 1]), paint([0.05, 0.1, 0.9, 1])];
+    gltf.meshes[0].primitives = [
+      { attributes, indices: add(triangles.filter((t) => !isLow(t)).flat()), material: 0 },
+      { attributes, indices: add(strip), mode: 5, material: 1 },
+    ];
+  };
+
+test('strips of a glTF are shown: of the file, of the document that is kept, and on its page', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const surface = ball(3, ([x, y, z]) => [x, 1.3 * y, z]);
+  const glb = writeGlb({ ...surface, edit: striped(surface) });
+  await addFiles(
+    page,
+    { name: 'egg.glb', mimeType: 'model/gltf-binary', buffer: glb },
+    {
+      name: 'bean.obj',
+      mimeType: 'text/plain',
+      buffer: Buffer.from(obj(ball(3, ([x, y, z]) => [x + 0.2 * y * y, y, z]))),
+    },
+  );
+  assert.match(await page.locator('.caption').first().innerText(), /512 triangles/);
+  assert.ok((await red(page)) > 1000 && (await blue(page)) > 1000, 'the file');
+  await page.getByRole('switch', { name: 'Keep the mesh of egg' }).click();
+  await button(page, 'Morph 2 shapes').click();
+  await defaultShown(page);
+  await button(page, 'Pause').click();
+  await settled(page);
+  assert.ok((await red(page)) > 1000 && (await blue(page)) > 1000, 'the document');
+  await assertPage(page, (other) =>
+    until(async () => (await red(other, 'canvas')) > 1000 && (await blue(other, 'canvas')) > 1000, 'the page'),
+  );
   await done();
 });

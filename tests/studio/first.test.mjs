@@ -32,6 +32,13 @@ async function pageWith(answer) {
   return { ...opened, posted };
 }
 
+/** Asks for the morph, of which the fast one is requested first. */
+async function morph(page, posted) {
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(() => posted.length, 'a morph is requested');
+  assert.equal(posted[0], 'fast');
+}
+
 /** A promise and the function that resolves it. */
 function gate() {
   let open;
@@ -48,7 +55,7 @@ test('the default morph replaces the fast one and keeps time, camera and view', 
     if (kind === 'default') await opened;
     await route.continue();
   });
-  await button(page, /^Morph 2 shapes$/).click();
+  await morph(page, posted);
   await until(() => button(page, 'Pause').count(), 'the fast morph plays');
   assert.deepEqual(posted, ['fast', 'default']);
   assert.match(await shown(page).innerText(), /^Shown: the fast morph\. The default one replaces it/);
@@ -94,7 +101,7 @@ test('the default job is sent when the fast one has ended, not to compute beside
       ? route.fulfill({ contentType: 'text/event-stream', body: `event: progress\ndata: ${JSON.stringify(job)}\n\n` })
       : route.fulfill({ json: { ...job, state: ended ? 'cancelled' : 'running' } }),
   );
-  await button(page, /^Morph 2 shapes$/).click();
+  await morph(page, posted);
   const polled = () => page.waitForRequest((request) => request.url().endsWith('/events'));
   await polled();
   await polled();
@@ -114,7 +121,7 @@ test('a fast morph that fails does not hide the default one', async () => {
   const { page, posted, done } = await pageWith((kind, route) =>
     kind === 'fast' ? refuse(route, 'No fast morph') : route.continue(),
   );
-  await button(page, /^Morph 2 shapes$/).click();
+  await morph(page, posted);
   await defaultShown(page);
   await until(() => button(page, 'Pause').count(), 'the default morph plays');
   assert.deepEqual(posted, ['fast', 'default']);
@@ -124,12 +131,12 @@ test('a fast morph that fails does not hide the default one', async () => {
 
 test('the fast morph stays if the default one fails', async () => {
   const { opened, open } = gate();
-  const { page, done } = await pageWith(async (kind, route) => {
+  const { page, posted, done } = await pageWith(async (kind, route) => {
     if (kind === 'fast') return route.continue();
     await opened;
     return refuse(route, 'No default morph');
   });
-  await button(page, /^Morph 2 shapes$/).click();
+  await morph(page, posted);
   await until(() => button(page, 'Pause').count(), 'the fast morph plays');
   open();
   await page.getByRole('alert').getByText('No default morph').waitFor();
@@ -139,8 +146,8 @@ test('the fast morph stays if the default one fails', async () => {
 });
 
 test('cancelling keeps the fast morph and stops the default one', async () => {
-  const { page, done } = await pageWith((kind, route) => (kind === 'fast' ? route.continue() : undefined));
-  await button(page, /^Morph 2 shapes$/).click();
+  const { page, posted, done } = await pageWith((kind, route) => (kind === 'fast' ? route.continue() : undefined));
+  await morph(page, posted);
   await until(() => button(page, 'Pause').count(), 'the fast morph plays');
   await button(page, 'Cancel').click();
   await until(() => shownToasts(page).then((list) => list.includes('Cancelled.')), 'the page says so');
@@ -152,7 +159,7 @@ test('cancelling keeps the fast morph and stops the default one', async () => {
 
 test('progress names the morph and its stage', async () => {
   const { opened, open } = gate();
-  const { page, done } = await pageWith(async (kind, route) => {
+  const { page, posted, done } = await pageWith(async (kind, route) => {
     if (kind === 'default') await opened; // or it may end before the fast one, which then is not waited for
     await route.continue();
   });
@@ -169,7 +176,7 @@ test('progress names the morph and its stage', async () => {
     input.value = '-3.5';
     input.dispatchEvent(new Event('input', { bubbles: true }));
   });
-  await button(page, /^Morph 2 shapes$/).click();
+  await morph(page, posted);
   await until(() => button(page, 'Pause').count(), 'the fast morph plays');
   open();
   await defaultShown(page);
@@ -187,7 +194,7 @@ test('progress names the morph and its stage', async () => {
 
 test('progress draws no shape again: without a GPU that takes a core from the daemon', async () => {
   const { opened, open } = gate();
-  const { page, done } = await pageWith(async (_kind, route) => {
+  const { page, posted, done } = await pageWith(async (_kind, route) => {
     await opened;
     await route.continue();
   });
@@ -196,7 +203,7 @@ test('progress draws no shape again: without a GPU that takes a core from the da
     globalThis.drawings = 0;
     document.querySelector('.stage').addEventListener('drawn', () => globalThis.drawings++);
   });
-  await button(page, /^Morph 2 shapes$/).click();
+  await morph(page, posted);
   await until(async () => /^0:0[2-9]/.test(await page.locator('.progress .hint').first().innerText()), 'two seconds');
   assert.equal(await page.evaluate(() => globalThis.drawings), 0);
   open();

@@ -43,17 +43,17 @@ const filled = (page) => countPixels(page, '.pane-view', (r, g, b) => r - b > 25
 
 test('one button closes all handles, also those that the refusal does not list', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  // bars that get wider: the 20 handles that the refusal omits are the longest
-  const surface = grating(12, 10, ([x, y, z]) => [x * (1 + 0.12 * x), y, z]);
+  // bars that get wider: the handles that the refusal omits are among the longest
+  const surface = grating(36, 28, ([x, y, z]) => [x * (1 + 0.12 * x), y, z]);
   await refused(page, 'grating', surface);
   const alert = page.getByRole('alert');
-  assert.match(await alert.innerText(), /Genus 120\./);
+  assert.match(await alert.innerText(), /Genus 1008\./);
   assert.match(await page.getByRole('list', { name: 'Handles' }).innerText(), /95 more$/);
   const before = await filled(page);
   assert.equal(await alert.getByRole('button').count(), 1);
-  await button(page, 'Close all 120 handles').click();
+  await button(page, 'Close all 1,008 handles').click();
   const mesh = await mended(page, 'grating');
-  assert.equal(mesh.repairs.filter(({ kind, count }) => kind === 'close_handles' && count > 0).length, 120);
+  assert.equal(mesh.repairs.filter(({ kind, count }) => kind === 'close_handles' && count > 0).length, 1008);
   assert.notEqual(await filled(page), before, 'the picture is that of the mended mesh');
   await done();
 });
@@ -146,6 +146,17 @@ test('pieces of one name are told apart, and each can be kept', async () => {
   await button(page, 'Keep “eye”, piece 2 (4 triangles)').click();
   const mesh = await mended(page, 'body');
   assert.equal(mesh.triangles, 4);
+  await done();
+});
+
+test('a repaired file keeps its materials', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const file = { name: 'body.glb', mimeType: 'model/gltf-binary', buffer: rigged().bytes };
+  await page.locator('input[type=file]').first().setInputFiles(file);
+  const blue = () => countPixels(page, '.pane-view', (r, g, b) => b > r + 30 && b > g + 20);
+  await button(page, 'Keep the largest piece').click();
+  await mended(page, 'body');
+  assert.ok((await blue()) > 2000, 'the lower half of the body is blue');
   await done();
 });
 

@@ -17,7 +17,7 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress', 'others']
+      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress', 'others', 'mended']
         .map((name) => `export * from './${name}.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
@@ -286,6 +286,66 @@ test('glTF: accessors of all primitives one after another, after node transforms
   assert.deepEqual([...raw.corners], [...FACES.flat(), ...FACES.flat().map((v) => v + 4)]);
 });
 
+test('glTF: strips and fans, sparse and quantized accessors', () => {
+  // the tetrahedron as a strip that repeats a vertex, as a fan and a triangle, and as triangles without indices
+  const lists = [
+    [0, 2, 1, 3, 0, 0, 2],
+    [0, 2, 1, 3, 2],
+    [1, 2, 3],
+  ];
+  const integers = Int16Array.from([...TETRAHEDRON.flat().map((x) => 32767 * x), ...Array(12).fill(0)]);
+  const values = Float32Array.from(TETRAHEDRON.slice(1).flat());
+  const parts = [integers, Uint16Array.from([1, 2, 3, 0]), values, ...lists.map((l) => Uint16Array.from([...l, 0]))];
+  const blocks = parts.map((list) => Buffer.from(list.buffer));
+  let at = 0;
+  const bufferViews = blocks.map(({ length }) => ({
+    buffer: 0,
+    byteOffset: (at += length) - length,
+    byteLength: length,
+  }));
+  const sparse = { count: 3, indices: { bufferView: 1, componentType: 5123 }, values: { bufferView: 2 } };
+  const json = {
+    asset: { version: '2.0' },
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }],
+    meshes: [
+      {
+        primitives: [
+          { attributes: { POSITION: 0 }, indices: 2, mode: 5 },
+          { attributes: { POSITION: 1 }, indices: 3, mode: 6 },
+          { attributes: { POSITION: 1 }, indices: 4 },
+          { attributes: { POSITION: 0 }, mode: 1 },
+        ],
+      },
+    ],
+    accessors: [
+      { bufferView: 0, componentType: 5122, normalized: true, count: 4, type: 'VEC3' },
+      { componentType: 5126, count: 4, type: 'VEC3', sparse },
+      ...lists.map((l, i) => ({ bufferView: 3 + i, componentType: 5123, count: l.length, type: 'SCALAR' })),
+    ],
+    bufferViews,
+    buffers: [
+      { byteLength: at, uri: `data:application/octet-stream;base64,${Buffer.concat(blocks).toString('base64')}` },
+    ],
+  };
+  const raw = mesh.parseMesh(text(JSON.stringify(json)));
+  assert.deepEqual(
+    [...raw.positions],
+    [0, 1, 2].flatMap(() => TETRAHEDRON.flat()),
+  );
+  const found = [];
+  for (let i = 0; i < raw.corners.length; i += 3) found.push([...raw.corners.subarray(i, i + 3)]);
+  assert.deepEqual(found, [
+    [0, 2, 1],
+    [2, 3, 1],
+    [1, 3, 0],
+    [6, 5, 4],
+    [5, 7, 4],
+    [7, 6, 4],
+    [9, 10, 11],
+  ]);
+});
+
 test('what cannot be drawn is omitted, and invalid files do not throw', () => {
   const raw = mesh.parseMesh(text('v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\nf 1 2 4\nf 1 2 3\nf 1 2 9\n'));
   assert.deepEqual([...raw.corners], [0, 1, 3]);
@@ -491,6 +551,56 @@ test('repairs add up; a piece replaces the largest, and a size another size', ()
     ['safe', 'none', 'none'],
   ];
   for (const [list, more, expected] of cases) assert.equal(mesh.withRepairs(list, more), expected);
+});
+
+test('a repaired mesh: triangles of the file keep its look, patches are plain', () => {
+  const { positions, triangles } = ball(1);
+  const image = Buffer.from('not decoded here');
+  // every triangle has vertices of its own, as along seams; the first two are missing
+  const corners = triangles.slice(2).flat();
+  const raw = {
+    format: 'glb',
+    positions: Float64Array.from(corners.flatMap((v) => positions[v])),
+    corners: Uint32Array.from(corners.keys()),
+    dress: {
+      uv: Float32Array.from(corners.flatMap((_, i) => [i, -i])),
+      dye: null,
+      cover: Uint16Array.from(corners, (_, i) => (i < 30 ? 0 : 1)),
+      covers: [0, 1].map((n) => ({ base: [n, 0, 0], image: n - 1, wrap: [10497, 10497], cutoff: 0 })),
+      images: [image],
+    },
+  };
+  // what the daemon has: welded, some triangles begin with another corner, and a patch with a vertex of its own
+  const middle = positions.length;
+  const [[a, b, c]] = triangles;
+  const repaired = {
+    format: 'ply',
+    positions: Float64Array.from([...positions, [9, 9, 9]].flat()),
+    corners: Uint32Array.from(
+      [...triangles.slice(2).map(([p, q, r], i) => (i % 2 ? [q, r, p] : [p, q, r])), [a, b, middle], [a, b, c]].flat(),
+    ),
+    properties: new Map([
+      ['source', Float64Array.from([...positions.keys()].map((v) => corners.indexOf(v)).concat(-1))],
+    ]),
+  };
+  const { raw: made, added } = mesh.mendedMesh(repaired, raw);
+  assert.equal(added, corners.length);
+  const kept = triangles.length - 2;
+  for (let t = 0; t < kept + 2; t++)
+    for (let k = 0; k < 3; k++) {
+      const v = made.corners[3 * t + k];
+      const at = [...made.positions.subarray(3 * v, 3 * v + 3)];
+      const from = repaired.corners[3 * t + k];
+      assert.deepEqual(at, [...repaired.positions.subarray(3 * from, 3 * from + 3)]);
+      if (t < kept) assert.equal(v, 3 * t + ((t % 2 ? k + 1 : k) % 3), 'the corner of the file');
+      else assert.ok(v >= added && made.dress.covers[made.dress.cover[v]].image === -1, 'plain');
+      assert.equal(made.dress.uv[2 * v], t < kept ? v : 0);
+    }
+  assert.equal(made.dress.cover[made.corners[0]], 0);
+  assert.equal(made.dress.cover[made.corners[3 * kept - 1]], 1);
+  assert.deepEqual(made.dress.images, [image]);
+  // of a file that only the daemon can read, the numbers alone are known
+  assert.equal(mesh.mendedMesh(repaired, undefined).raw.dress, undefined);
 });
 
 test('a kept document: the new targets, in the scene, then those that it had, and the meshes that stay', () => {

@@ -36,18 +36,16 @@ export const slide = (slider, value) =>
 export const scrubber = (page) => page.getByRole('slider', { name: 'Along the morph' });
 export const seek = (page, value) => slide(scrubber(page), value);
 
-/** Starts a daemon whose only worker another job occupies. */
-export async function startOccupied() {
+/** Starts a daemon whose only worker another job occupies, until the test ends. */
+export async function startOccupied(t) {
   const busy = await startDaemon({ args: ['--workers', '1'] });
   const post = async (path, body, headers) => (await fetch(busy.url + path, { method: 'POST', headers, body })).json();
   const { id: mesh } = await post('/v1/meshes', obj(ball(5)));
   const type = { 'Content-Type': 'application/json' };
   const other = await post('/v1/embeddings', JSON.stringify({ mesh, ...endless }), type);
-  return {
-    url: busy.url,
-    stop: async () => {
-      await fetch(busy.url + other.url, { method: 'DELETE' });
-      await busy.stop();
-    },
-  };
+  t.after(async () => {
+    await fetch(busy.url + other.url, { method: 'DELETE' });
+    await busy.stop();
+  });
+  return busy;
 }

@@ -303,8 +303,8 @@ static void test_refused(void **state) {
     orb_mesh ring = torus(24, 1);
     check_refused(&ring, i ? &close : &safe, 1);
     size_t size;
-    static const int holes[] = {1, 3, 5, 60};
-    for (int k = 0; k < 4; k++) {
+    static const int holes[] = {1, 3, 5, 60, ORB_ERROR_LOOPS};
+    for (int k = 0; k < (i ? 4 : 5); k++) {
       char *text = handles_plate(holes[k], &size);
       orb_mesh plate = read_text(text, size);
       check_refused(&plate, i ? &close : &safe, holes[k]);

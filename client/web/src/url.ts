@@ -1,9 +1,9 @@
 /**
  * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
- * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), go=1: the job is sent once the fast
- * one is computed, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l: landmarks (a vertex or x_y_z for each shape),
- * cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: of its materials, e: the weights of its
+ * m: meshes on the server, r: a supermesh, j: a job, find=1: one that finds landmarks, go=1: one that makes the morph, where
+ * it has no id yet, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l:
+ * landmarks (a vertex or x_y_z for each shape), cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: of its materials, e: the weights of its
  * targets that are not shapes.
  */
 import type { Place } from 'orbmorph';
@@ -119,8 +119,8 @@ function encode(): string {
   if (state.tab !== 'shapes') put('tab', state.tab);
   put('r', state.result?.supermesh.id ?? '');
   put('j', state.running?.job?.id ?? '');
-  if (state.running?.job && state.running.purpose === 'find') put('find', '1');
-  if (state.running?.fast && !state.running.job) put('go', '1');
+  if (state.running?.purpose === 'find') put('find', '1');
+  else if (state.running && !state.running.job && !state.running.matches) put('go', '1');
   put('q', encodeMatch());
   if (state.result && !state.playing) put('t', player.time.toFixed(3));
   put(
@@ -166,17 +166,53 @@ function save() {
   clearTimeout(timer);
   timer = window.setTimeout(() => {
     timer = 0;
-    if (restoring) return;
-    const text = encode();
-    const bare = text.replace(/&?cam=[^&]*/, '');
-    const next = bare || state.shapes.length ? `#${text}` : '';
-    if (next === written) return;
-    written = next;
-    history.replaceState(null, '', next || location.pathname + location.search);
+    if (!restoring) write(hash());
   }, REST);
 }
 
+/** The part of the URL that says what the page shows. */
+function hash(): string {
+  const text = encode();
+  const bare = text.replace(/&?cam=[^&]*/, '');
+  return bare || state.shapes.length ? `#${text}` : '';
+}
+
+function write(next: string) {
+  if (next === written) return;
+  written = next;
+  history.replaceState(null, '', next || location.pathname + location.search);
+}
+
+/** What the page shows, if it goes away before that is in its URL: a page that reloads has the URL of before. */
+const LATE = 'orbmorph.late';
+
+function keepLate() {
+  const late = timer && !restoring && location.hash === written; // else another URL has been pasted
+  try {
+    if (late) sessionStorage.setItem(LATE, JSON.stringify({ from: written, to: hash() }));
+    else sessionStorage.removeItem(LATE);
+  } catch {
+    // without storage, the last second is lost
+  }
+}
+
+/** After a reload, and on the way back: brings the URL up to date. */
+function takeLate() {
+  try {
+    const late = sessionStorage.getItem(LATE);
+    sessionStorage.removeItem(LATE);
+    const [navigation] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
+    if (!late || navigation?.type === 'navigate') return;
+    const { from, to } = JSON.parse(late);
+    if (from === written) write(to);
+  } catch {
+    // there is no storage
+  }
+}
+
 export async function restore() {
+  written = location.hash;
+  takeLate();
   const query = new URLSearchParams(location.hash.slice(1).replace(/\+/g, '%2B'));
   restoring = true;
   let next: Matches | undefined;
@@ -247,6 +283,7 @@ export async function restore() {
   }
   const job = query.get('j');
   if (job) void resumeJob(job, query.get('find') ? 'find' : 'morph', next);
+  else if (query.get('find')) void startMerge('find');
   else if (query.get('go')) void startMerge();
 }
 
@@ -255,6 +292,7 @@ export function keepUrl() {
   watch(save);
   player.listen(() => state.playing || save()); // a playing morph has no time in its URL
   stage.onMoved = save;
+  window.addEventListener('pagehide', keepLate);
   window.addEventListener('hashchange', () => {
     if (location.hash !== written) location.reload();
   });

@@ -40,7 +40,7 @@ export interface Skin {
 }
 
 const LARGEST = 2048; // pixels of a texture's side
-const PLAIN: Cover = { base: [1, 1, 1], image: -1, wrap: [10497, 10497], cutoff: 0 };
+export const PLAIN: Cover = { base: [1, 1, 1], image: -1, wrap: [10497, 10497], cutoff: 0 };
 
 /** The cover of glTF primitives; null where all is grey, as in assets without material: the shape's tint. */
 export function dressOf(gltf: Gltf, parts: Part[]): Dress | null {

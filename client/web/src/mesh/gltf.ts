@@ -233,16 +233,30 @@ export class Gltf {
     const parts: Part[] = [];
     (this.json.meshes ?? []).forEach((mesh, number) => {
       for (const primitive of mesh.primitives) {
-        if ((primitive.mode ?? 4) !== 4 || primitive.attributes.POSITION === undefined) continue;
+        const mode = primitive.mode ?? 4;
+        if (mode < 4 || mode > 6 || primitive.attributes.POSITION === undefined) continue;
         const position = this.floats(primitive.attributes.POSITION);
         let index: Uint32Array;
         if (primitive.indices !== undefined) index = this.integers(primitive.indices);
         else index = Uint32Array.from({ length: position.length / 3 }, (_, i) => i);
+        if (mode > 4) index = apart(index, mode === 6);
         parts.push({ position, index, matrix: matrices.get(number)?.[0] ?? IDENTITY, primitive, mesh: number });
       }
     });
     return parts;
   }
+}
+
+/** The triangles of a strip or a fan. Those that repeat a vertex only change the direction of a strip. */
+function apart(list: Uint32Array, fan: boolean): Uint32Array {
+  const out: number[] = [];
+  for (let i = 0; i + 2 < list.length; i++) {
+    const [a, b, c] = fan
+      ? [list[i + 1], list[i + 2], list[0]]
+      : [list[i], list[i + 1 + (i % 2)], list[i + 2 - (i % 2)]];
+    if (a !== b && b !== c && c !== a) out.push(a, b, c);
+  }
+  return Uint32Array.from(out);
 }
 
 function dataUri(uri: string): Uint8Array {

@@ -8,6 +8,7 @@ import { decodeMorph, type MorphData } from './morph';
 import { decodeSphere, type SphereData } from './distortion';
 import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } from './geometry';
 import { decodeImages } from './dress';
+import { mendedMesh } from './mended';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
 import { stretchOf, touched, type Touched } from './linked';
@@ -23,6 +24,8 @@ interface Held {
   bvh?: Bvh;
   /** vertices from this number on are not in the file: a repair added them */
   added: number;
+  /** as the page reads it; undefined where only the daemon can */
+  file?: RawMesh;
   /** undefined until it is searched */
   plane?: Plane | null;
 }
@@ -110,28 +113,18 @@ const ops = {
     const raw = parseMesh(buffer);
     if (!raw.corners.length) throw new Error('The file has no triangles.');
     const display = buildDisplay(raw);
-    held.set(key, { raw, frame: display.frame, added: Infinity });
+    held.set(key, { raw, frame: display.frame, added: Infinity, file: raw });
     await decodeImages(display.skin);
     return display;
   },
 
   /** Replaces a mesh by what the daemon made of its file: sphere.ply has it, with the numbers of the file. */
-  openRepaired(key: string, buffer: ArrayBuffer): Display {
-    const repaired = parseMesh(buffer);
-    const source = repaired.properties?.get('source');
-    if (!source) throw new Error('The daemon did not say which vertices the mesh has.');
-    const added = source.reduce((most, s) => Math.max(most, s + 1), 0);
-    const number = new Uint32Array(source.length);
-    let next = added;
-    source.forEach((s, i) => (number[i] = s >= 0 ? s : next++));
-    const raw: RawMesh = {
-      format: repaired.format,
-      positions: new Float64Array(3 * next),
-      corners: repaired.corners.map((v) => number[v]),
-    };
-    number.forEach((to, i) => raw.positions.set(repaired.positions.subarray(3 * i, 3 * i + 3), 3 * to));
+  async openRepaired(key: string, buffer: ArrayBuffer): Promise<Display> {
+    const file = held.get(key)?.file;
+    const { raw, added } = mendedMesh(parseMesh(buffer), file);
     const display = buildDisplay(raw);
-    held.set(key, { raw, frame: display.frame, added });
+    held.set(key, { raw, frame: display.frame, added, file });
+    await decodeImages(display.skin);
     return display;
   },
 

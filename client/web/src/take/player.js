@@ -133,7 +133,7 @@ function meshOf({ json, read }, variant, extras) {
     ...toScene(m, read),
   });
   const staying = (p, m) => ({ ...p, material: dressed(p), targets: [], still: [], ...toScene(m, read) });
-  const isSurface = ({ mode = 4, attributes }) => mode === 4 && attributes.POSITION !== undefined;
+  const isSurface = ({ mode = 4, attributes }) => mode >= 4 && mode <= 6 && attributes.POSITION !== undefined;
   const primitives = meshes.flatMap((mesh) => {
     const [m = matrixOf({})] = placed(mesh);
     return mesh.primitives.filter(isSurface).map((p) => morphing(p, m));
@@ -269,6 +269,18 @@ function programOf(gl) {
 
 const linear = (hex) => [1, 3, 5].map((i) => (parseInt(hex.slice(i, i + 2), 16) / 255) ** 2.2);
 
+/** The corners of triangles, also those of a strip (mode 5) and of a fan (6). */
+const trianglesOf = (list, mode = 4) =>
+  mode === 4
+    ? list
+    : Uint32Array.from(
+        [...list.keys()]
+          .slice(2)
+          .flatMap((i) =>
+            mode === 6 ? [list[i - 1], list[i], list[0]] : [list[i - 2], list[i - 1 + (i % 2)], list[i - (i % 2)]],
+          ),
+      );
+
 /** Uploads a primitive. The positions are placed in the unit ball by centre and radius. */
 async function partOf(gl, file, primitive, center, radius) {
   const { json, read, image } = file;
@@ -281,10 +293,12 @@ async function partOf(gl, file, primitive, center, radius) {
   };
   const position = primitive.places(attributes.POSITION);
   const count = position.length / 3;
-  const index =
+  const index = trianglesOf(
     primitive.indices === undefined
       ? Uint32Array.from({ length: count }, (_, i) => i)
-      : Uint32Array.from(read(primitive.indices));
+      : Uint32Array.from(read(primitive.indices)),
+    primitive.mode,
+  );
   for (let i = 0; primitive.mirrored && i < index.length; i += 3)
     [index[i + 1], index[i + 2]] = [index[i + 2], index[i + 1]];
   const normals = (at) => {

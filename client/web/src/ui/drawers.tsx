@@ -179,7 +179,7 @@ const viewerPage = (asset: string, names: string[]) => `<!doctype html>
 <meta charset="utf-8">
 <title>${escaped(names.join(' to '))}</title>
 <style>html, body { margin: 0; height: 100% } model-viewer { width: 100%; height: 100% }</style>
-<script type="module" src="https://cdn.jsdelivr.net/npm/@google/model-viewer@4.1.0/dist/model-viewer.min.js"></script>
+<script type="module" src="https://cdn.jsdelivr.net/npm/@google/model-viewer@4.4.0/dist/model-viewer.min.js"></script>
 <model-viewer src="${asset}" alt="${escaped(names.join(' to '))}" autoplay camera-controls></model-viewer>
 `;
 
