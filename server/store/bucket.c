@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "api/sha256.h"
 #include "api/text.h"
 #include "log.h"
 #include "store/s3_keys.h"
@@ -45,7 +46,7 @@ int bucket_hash(int fd, uint64_t from, uint64_t size, char out[65]) {
       n = pread(fd, block, left, (off_t)(from + done));
     } while (n < 0 && errno == EINTR);
     if (n > 0) {
-      crypto_hash_sha256_update(&state, block, (unsigned long long)n);
+      api_sha256_add(&state, block, (size_t)n);
     }
   }
   crypto_hash_sha256_final(&state, digest);
