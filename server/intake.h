@@ -13,13 +13,13 @@
 typedef struct intake_file {
   object_temp *temp;
   int64_t size;
-  const unsigned char *bytes; /* mapped */
+  unsigned char *bytes; /* mapped, or, of a small file, allocated */
   const api_upload *upload;
   orb_format format; /* as which the file is read */
   char id[API_ID_SIZE], sha[API_ID_SIZE];
 } intake_file;
 
-/* Maps a complete temporary file and computes the id of its mesh. hash: of its bytes. 0: no memory. The file keeps
+/* Maps or reads a complete temporary file and computes the id of its mesh. hash: of its bytes. 0: no memory. The file keeps
  * pointers to temp and upload. */
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload);
 void intake_close(intake_file *file); /* also deletes the temporary file if it is left */
