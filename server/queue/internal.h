@@ -59,7 +59,8 @@ struct job {
 
 struct queue {
   pthread_mutex_t lock;
-  pthread_cond_t work, fetch_work, committed, timer_wake; /* fetch_work: for the threads that fetch */
+  pthread_cond_t work, guest_work, fetch_work; /* for the threads of each lane; where jobs are shared, `work` for all */
+  pthread_cond_t committed, timer_wake;
   queue_options options;
   catalogue *cat;
   job *by_id[BUCKETS], *by_key[BUCKETS];
@@ -100,13 +101,21 @@ static inline int fetches(const job *j) {
 static inline int64_t used_ms(const job *j, int64_t now) {
   return now > j->taken_at ? now - j->taken_at : 0;
 }
-/* Something may be there to take. Threads whose jobs there are not sleep on. */
+/* Something may be there to take. All threads of a lane may take the same jobs, so one of them looks. If it takes a
+ * job, it wakes the next. */
 static inline void wake_workers(queue *q) {
-  if (q->shared || q->unfinished > q->unfinished_fetches || q->stopping) { /* shared: all wait for that */
+  if (q->shared || q->stopping) {
     pthread_cond_broadcast(&q->work);
-  }
-  if (q->unfinished_fetches > 0 || q->stopping) {
+    pthread_cond_broadcast(&q->guest_work);
     pthread_cond_broadcast(&q->fetch_work);
+    return;
+  }
+  if (q->unfinished > q->unfinished_fetches) {
+    pthread_cond_signal(&q->work);
+    pthread_cond_signal(&q->guest_work);
+  }
+  if (q->unfinished_fetches > 0) {
+    pthread_cond_signal(&q->fetch_work);
   }
 }
 void owner_enter(queue *q, job *j); /* sets j->owner */
