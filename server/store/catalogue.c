@@ -15,13 +15,13 @@
 #include "store/transactions.h"
 #include "wake.h"
 
-enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node, or met it */
+enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node or conflicted with it */
 
 /* How long events and times of use wait for a write whose caller waits. Their own commit, with its fdatasync(), costs
  * more than all else that a small job writes. The end of such a job takes its events along. */
 enum { GATHER_MS = 20 };
 
-/* A waiting write. That of catalogue_write() lies on its caller's stack. */
+/* A waiting write. catalogue_write() keeps it on its caller's stack. */
 typedef struct pending {
   struct pending *next;
   write_fn fn;
@@ -37,7 +37,7 @@ struct catalogue {
   pending *first, **last;
   int urgent; /* of the waiting writes, all but those of catalogue_write_gathered() */
   int stopping, started;
-  int shared; /* other nodes use it, too */
+  int shared; /* other nodes use it as well */
   pthread_t thread;
   database writer;
   database readers[DATABASE_READERS];
@@ -62,7 +62,7 @@ static store_result result_of(int code) {
   }
 }
 
-/* Nodes write one after another: the same that one writer thread ensures within a process. */
+/* Nodes write one after another, as the writers of one process do through its writer thread. */
 static int begin(const catalogue *cat, database *db) {
   char sql[96];
   snprintf(sql, sizeof sql, "BEGIN; SELECT pg_advisory_xact_lock(%d, hashtext(current_schema()))", SQL_LOCK_WRITES);
@@ -141,7 +141,7 @@ static void *writer_main(void *argument) {
         free(p->arg);
         free(p);
       } else {
-        p->done = 1; /* its thread may now return, and p with it */
+        p->done = 1; /* its thread may now return, which ends the life of p */
       }
     }
     pthread_cond_broadcast(&cat->committed);
@@ -219,7 +219,7 @@ void catalogue_reader_done(catalogue *cat, database *db) {
   pthread_mutex_unlock(&cat->lock);
 }
 
-/* Whether the catalogue is whole, and not the half of one. */
+/* Whether the catalogue is complete, and not one that a move has filled in part. */
 static int check_whole(database *db) {
   char mark[MOVE_MARK];
   int code = move_mark_read(db, mark);
