@@ -110,7 +110,7 @@ int intake_check_here(const task_head *task, const unsigned char *sent, int fd, 
   return fine;
 }
 
-/* Whether a description is JSON and says what the daemon knows itself: jobs of all owners read the mesh as it says. */
+/* Whether a description is valid JSON and agrees with what the daemon knows. Jobs of all owners read the mesh by it. */
 static int is_of(const task_head *task, const char *text) {
   api_mesh_summary summary;
   api_json_error error;
@@ -215,7 +215,8 @@ static int check_isolated(const intake_file *file, const task_head *task, const 
     return 0;
   }
   isolate_status_text(status, why, sizeof why);
-  *died = status != -1 && !(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL); /* or memory was short */
+  *died = status != -1 &&
+          !(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL); /* or the kernel killed it because memory was short */
   log_error("the process that checked mesh %s %s", file->id, why);
   return api_refuse(problem, "job-crashed",
                     "The process that read the file died. Please report this as a bug, with the file.");
@@ -257,7 +258,7 @@ static void drop_unused(catalogue *cat, objects *store, const char *id) {
   resource_free(&row);
 }
 
-/* Whether what was published before the hold was lost is there now. Otherwise its bytes are sent again. */
+/* Publishes the object again if it is gone: it was published before the hold was lost. */
 static store_result publish_again(objects *store, const intake_file *file) {
   objects_hold_again(store);
   store_result there = objects_look(store, OBJECT_MESH, file->id);

@@ -10,11 +10,12 @@
 
 enum { BUCKETS = 8192, KEEP_ENDED = 512, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
 static const int64_t LARGE = 300000; /* a job with more triangles than this is large */
-/* Estimate of a running job's memory: so much for each triangle, and a base, at most a share of what all may have. A
- * job that needs more runs again with all of it. */
+/* Estimate of a running job's memory: a base and so many bytes for each triangle, but at most a share of what all jobs
+ * may have. A job that needs more runs again with all of it. */
 static const int64_t BYTES_A_TRIANGLE = 1024, BYTES_OF_JOB = INT64_C(64) << 20, SHARE_OF_JOB = 8;
 static const int64_t TRIANGLES_A_MS = 100; /* estimate of a worker's speed, charged until the time is known */
-/* A job goes back into the queue for so long after the store has failed to end it, and after it failed to begin it. */
+/* How long a job waits in the queue after the store failed to record its end, and after it failed to record its start.
+ */
 static const int64_t RETRY_AFTER_STORE_MS = 5000, RETRY_SOON_MS = 1000;
 static const int64_t EVENT_STRIDE = 1000000; /* event numbers of an attempt start above attempt times this */
 
