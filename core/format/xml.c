@@ -17,7 +17,7 @@ struct orb_xml {
   int64_t given;
 };
 
-/* Expat's allocator gets no argument of ours, so each call of Expat says whose budget it works on. */
+/* Expat passes no argument to its allocator, so this says whose budget the present call of Expat uses. */
 static _Thread_local orb_context *payer;
 
 static orb_context *pay(orb_context *ctx) {
