@@ -2,11 +2,13 @@
 
 #include <string.h>
 
+#include "api/sha256.h"
+
 void api_hash_begin(api_hash *hash) {
   crypto_hash_sha256_init(&hash->state);
 }
 void api_hash_add(api_hash *hash, const void *bytes, size_t size) {
-  crypto_hash_sha256_update(&hash->state, bytes, size);
+  api_sha256_add(&hash->state, bytes, size);
 }
 void api_hash_end(api_hash *hash, char out[API_ID_SIZE]) {
   unsigned char digest[crypto_hash_sha256_BYTES];

@@ -13,34 +13,35 @@
 typedef struct intake_file {
   object_temp *temp;
   int64_t size;
-  const unsigned char *bytes; /* mapped */
+  unsigned char *bytes; /* mapped, or, of a small file, allocated */
   const api_upload *upload;
   orb_format format; /* as which the file is read */
   char id[API_ID_SIZE], sha[API_ID_SIZE];
 } intake_file;
 
-/* Maps a complete temporary file and computes the id of its mesh. hash: of its bytes. 0: no memory. The file keeps
- * pointers to temp and upload. */
+/* Maps or reads a complete temporary file and computes the id of its mesh. hash: of its bytes. 0: no memory. The file
+ * keeps pointers to temp and upload. */
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload);
 void intake_close(intake_file *file); /* also deletes the temporary file if it is left */
 
 /* Limits on a check; the context has the same. */
 typedef struct intake_limits {
   int64_t memory, deadline_ms, max_triangles;
-  budget_part part;          /* of which the memory is */
-  int (*wanted)(void *user); /* asked many times a second while a process checks: 0 ends it; NULL: always */
+  budget_part part; /* of which the memory is */
+  int (*wanted)(
+      void *user); /* called many times a second while a process checks: 0 ends the process; NULL: always wanted */
   void *user;
 } intake_limits;
 
-/* What became of a file. */
+/* The result of storing a file. */
 typedef struct intake_stored {
   int fresh;    /* the tenant did not own the mesh before */
   resource row; /* if this file was the first of its mesh: the row that all see; else without json. resource_free() */
 } intake_stored;
 
 /* Reads, repairs and checks the mesh, publishes the file and makes the tenant an owner. STORE_CONFLICT: the tenant's
- * quota in bytes (0: no limit) has no room, and nothing is stored. A mesh that is refused leaves its problem, and
- * STORE_OK. */
+ * quota in bytes (0: no limit) has no room, and nothing is stored. If the mesh is refused, the result is STORE_OK and
+ * *problem says why. */
 store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx,
                           const intake_limits *limits, const char *tenant, int64_t quota, intake_stored *out,
                           api_problem *problem);

@@ -111,7 +111,7 @@ static void on_change(const char *name, int taken) {
   }
 }
 
-/* A command from the control socket. */
+/* Executes a command from the control socket. */
 static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
   char what[8] = "", verb[8] = "", name[64] = "";
@@ -256,7 +256,7 @@ static int run(const command_line *line) {
   return result;
 }
 
-/* What needs the lock of the data folder: a command that no running daemon took, --check-data, --gc. */
+/* Does what needs the lock of the data folder: a command that no running daemon took, --check-data, --gc. */
 static int work_alone(const admin_command *admin, config_action action, const config *options) {
   return admin->kind                   ? admin_command_run(admin, options)
          : action == CONFIG_CHECK_DATA ? maintain_check(options)

@@ -63,7 +63,7 @@ static task *choose(tasks *pool) {
   return t;
 }
 
-/* Under the lock, which it lets go meanwhile. */
+/* Under the lock, which it releases meanwhile. */
 static void run(tasks *pool, task *t) {
   struct turn *turn = turn_of(pool, t);
   const budget_part part = t->part;

@@ -1,6 +1,6 @@
 /* Alignment without landmarks.
  *
- * The shapes are embedded anew, on spheres that keep angles. Every later shape is matched with the first one
+ * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
  * (find/match.c), and the composed map goes to the targets of its match. Of two shapes, the next best match is tried
  * where that leads to no good map. Of more, pairs of the matches are pinned as landmarks where it leads to none, and
  * the map is composed with them held and then without them. The alignment of least energy is returned. The preset

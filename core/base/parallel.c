@@ -207,7 +207,7 @@ void orb_pool_stop(orb_context *ctx) {
   orb_free(ctx, pool);
 }
 
-/* The entry of this body. Another's is taken over where all are in use. */
+/* The entry of this body. If all are in use, it replaces another one. */
 static loop_cost *cost_of(struct orb_pool *pool, orb_loop_fn body) {
   size_t at = ((uintptr_t)body >> 4) * 0x9e3779b1U;
   loop_cost *cost = NULL;

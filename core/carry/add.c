@@ -284,7 +284,7 @@ static orb_status add_to(orb_context *ctx, const orb_carrier *carrier, const int
     ORB_GO(status, bake_textures(ctx, carrier, &charts, vertices, a, more), done);
   }
   status = orb_gltf_add(ctx, asset->data, asset->size, more, &made);
-  if (status != ORB_OK) { /* of what can be refused there, orb_carry_check() has tried all but a second skin */
+  if (status != ORB_OK) { /* orb_carry_check() has tried all that this can refuse, except a second skin */
     status = orb_carry_blame(ctx, status, 0, carrier->skin_carry);
     goto done;
   }

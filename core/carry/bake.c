@@ -248,7 +248,7 @@ static int32_t list_materials(const baker *b, int32_t *list, double *area) {
 static int32_t choose_side(const orb_texels *texels, double area) {
   double wanted = area > 0 ? sqrt(orb_texels_count(texels) / area) : 0;
   int32_t side = ORB_BAKE_LEAST;
-  while (side < CHOSEN_MOST && side < 0.95 * wanted) { /* a little less is no loss to double the side for */
+  while (side < CHOSEN_MOST && side < 0.95 * wanted) { /* a slightly lower resolution does not justify twice the side */
     side *= 2;
   }
   return side;

@@ -72,7 +72,7 @@ orb_status orb_carry_entries(orb_context *ctx, const orb_carry *carries, int32_t
   return ORB_OK;
 }
 
-/* A skin is tried: its skeleton and their animations are copied to nowhere. */
+/* Tries a skin: copies its skeleton and the animations, and drops the copy. */
 static orb_status try_skin(orb_context *ctx, const orb_given_file *file, int *has) {
   static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   orb_given_skin skin;

@@ -50,14 +50,15 @@ static orb_status spread(orb_context *ctx, const orb_mesh *mesh, int64_t *known,
       }
       open[i] = from >= 0 ? -1 - (int64_t)h : (int64_t)h;
     }
-    for (int64_t i = 0; i < left; i++) { /* only now, so that a ring does not run on into the next */
+    for (int64_t i = 0; i < left;
+         i++) { /* only now, so that a corner of this ring does not serve others of the same ring */
       if (open[i] < 0) {
         open[i] = -1 - open[i];
         known[mesh->triangles[open[i]]] = open[i];
       }
     }
     if (reached == 0) {
-      break; /* nothing of the shape is in the file */
+      break; /* no corner of the shape has a blend */
     }
     count = left;
     ORB_TRY(orb_context_check(ctx));

@@ -1,6 +1,6 @@
-/* 3MF packages: ZIP archives whose XML has objects of vertices and triangles, and a build that places them. Read are
- * the core specification, the paths of the production extension, and of the materials extension the groups of colours;
- * what else there is of materials is noted as dropped. Coordinates are converted to millimetres. Vertices are numbered
+/* 3MF packages: ZIP archives whose XML has objects of vertices and triangles, and a build that places them. The reader
+ * takes the core specification, the paths of the production extension, and the groups of colours of the materials
+ * extension. It notes all other materials as dropped. Coordinates are converted to millimetres. Vertices are numbered
  * as they are placed: item by item of the build, components in their order, each mesh in file order.
  *
  * zip.c unpacks, xml.c parses, 3mf_xml.c reads the elements, 3mf_model.c holds them, 3mf_place.c makes the mesh. */

@@ -1,4 +1,5 @@
-/* Places the objects of a 3MF package: the items of its build, the components of their objects, theirs, and so on. */
+/* Places the objects of a 3MF package: the items of its build, the components of their objects, the components of
+ * those, and so on. */
 #include <stdio.h>
 #include <string.h>
 

@@ -216,7 +216,7 @@ static orb_status on_base(reading *x, const char **attributes) {
   ORB_TRY(add_material(x, name ? name : "", attribute(attributes, "displaycolor")));
   char *alpha = x->r->model.materials[x->r->model.material_count - 1].hex + 7;
   if (strcmp(alpha, "00") == 0) {
-    memcpy(alpha, "FF", 2); /* lib3mf 1 writes so where a program gives red, green and blue */
+    memcpy(alpha, "FF", 2); /* lib3mf 1 writes this if a program gives red, green and blue */
   }
   return ORB_OK;
 }
@@ -327,7 +327,7 @@ static orb_status on_item(reading *x, const char **attributes) {
 
 /* ---- files */
 
-/* What an element means where it stands; read NULL: nothing itself. */
+/* What an element means by its name and its parent. read NULL: only its children matter. */
 static const struct {
   place in;
   const char *name;
@@ -352,7 +352,7 @@ static const struct {
     {BUILD, CORE "item", ITEM, on_item},
 };
 
-/* What the reader does not read and says so. */
+/* What the reader does not read, but notes as dropped. */
 static const struct {
   const char *name, *what, *why;
 } UNREAD[] = {

@@ -347,7 +347,7 @@ struct Keeper {
     name_targets(editable(meshes[m]), m, had);
   }
 
-  /* What reads a compressed mesh with targets is rare; the studio and the page's player do not. */
+  /* Few programs read a compressed mesh with targets; the studio and the page's player do not. */
   void unpack_if_needed(Editor *editor) {
     bool is_needed = false;
     for (size_t m = 0; m < meshes.size(); m++) {

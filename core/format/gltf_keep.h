@@ -1,7 +1,7 @@
 /* A glTF document with more morph targets: everything else stays as it is.
  *
  * The bytes of the document's first buffer stay, and those of the targets follow. All members of the JSON stay, with
- * their order and values. Changed are: primitives[].targets, the weights of meshes and nodes, extras.targetNames and
+ * their order and values. It changes primitives[].targets, the weights of meshes and nodes, extras.targetNames and
  * extras.firstShape of the meshes, keyframes of these weights, and the lists of accessors, views and animations. Where
  * a mesh that gets targets is compressed, the document is unpacked: see gltf_unpack.hh. */
 #ifndef ORB_FORMAT_GLTF_KEEP_H

@@ -129,7 +129,7 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
     }
     charge(points * width * sizeof(double));
     Values values{Numbers(points * width, 0, Charged<double>(ctx_)), width};
-    /* Draco turns what it knows as shares of a whole into fractions by itself. */
+    /* Draco itself converts integers to fractions where its attribute is marked as normalized. */
     const int64_t type = whole(accessor, "componentType", 0);
     const bool is_share = cJSON_IsTrue(member(accessor, "normalized")) && type != 5126;
     const double unit = is_share && !attribute->normalized() ? component_most(type) : 1;

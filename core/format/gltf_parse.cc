@@ -35,7 +35,8 @@ size_t count_values(const unsigned char *text, size_t size) {
   return count;
 }
 
-/* Refuses objects whose look-ups would cost too much. Nobody looks into "extras", and into "extensions" only once. */
+/* Refuses objects whose look-ups would cost too much. The reader does not look into "extras", and looks into
+ * "extensions" only once. */
 void check_members(const cJSON *doc) {
   std::vector<const cJSON *> above; /* at most as deep as cJSON parses, 1,000 */
   auto is = [](const cJSON *item, const char *name) { return item->string && std::strcmp(item->string, name) == 0; };

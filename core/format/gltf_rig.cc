@@ -45,7 +45,7 @@ cJSON *scene_of(cJSON *doc) {
   return scenes.empty() ? nullptr : editable(element(scenes, whole(doc, "scene", 0), "scene"));
 }
 
-/* Moves a copy of a node within that above it. */
+/* Moves the copy of a node, relative to its parent. */
 void shift_node(cJSON *node, const double shift[3]) {
   double place[3] = {0, 0, 0}, matrix[16];
   if (shift[0] == 0 && shift[1] == 0 && shift[2] == 0) {

@@ -17,7 +17,7 @@ struct orb_xml {
   int64_t given;
 };
 
-/* Expat's allocator gets no argument of ours, so each call of Expat says whose budget it works on. */
+/* Expat passes no argument to its allocator, so this says whose budget the present call of Expat uses. */
 static _Thread_local orb_context *payer;
 
 static orb_context *pay(orb_context *ctx) {
@@ -38,6 +38,11 @@ static void xml_free(void *block) {
   orb_free(payer, block);
 }
 
+static orb_status refuse_token(const orb_xml *xml) {
+  return orb_build_malformed(xml->ctx, 1, orb_xml_line(xml), "A tag or comment of the XML has more than %d bytes.",
+                             ORB_XML_TOKEN);
+}
+
 static void stop(orb_xml *xml, orb_status status) {
   if (status != ORB_OK && xml->status == ORB_OK) {
     xml->status = status;
@@ -45,9 +50,27 @@ static void stop(orb_xml *xml, orb_status status) {
   }
 }
 
+/* Refuses a token that is longer than ORB_XML_TOKEN, once it is complete. Returns 0 if the parser has been stopped. */
+static int measure(orb_xml *xml) {
+  if (xml->status == ORB_OK && XML_GetCurrentByteCount(xml->parser) > ORB_XML_TOKEN) {
+    stop(xml, refuse_token(xml));
+  }
+  return xml->status == ORB_OK;
+}
+
+static void on_comment(void *user, const XML_Char *text) {
+  (void)text;
+  (void)measure(user);
+}
+
+static void on_instruction(void *user, const XML_Char *target, const XML_Char *text) {
+  (void)target, (void)text;
+  (void)measure(user);
+}
+
 static void on_start(void *user, const XML_Char *name, const XML_Char **attributes) {
   orb_xml *xml = user;
-  if (xml->status != ORB_OK) {
+  if (!measure(xml)) {
     return;
   }
   stop(xml, xml->depth < ORB_XML_DEPTH ? xml->element(xml->user, name, attributes, xml->depth)
@@ -59,7 +82,7 @@ static void on_start(void *user, const XML_Char *name, const XML_Char **attribut
 static void on_end(void *user, const XML_Char *name) {
   orb_xml *xml = user;
   xml->depth--;
-  if (xml->status == ORB_OK) {
+  if (measure(xml)) {
     stop(xml, xml->element(xml->user, name, NULL, xml->depth));
   }
 }
@@ -89,6 +112,8 @@ orb_status orb_xml_begin(orb_context *ctx, orb_xml_element element, void *user, 
   (void)XML_SetHashSalt(xml->parser, (unsigned long)orb_hash(ctx, "xml", 3) | 1);
   XML_SetUserData(xml->parser, xml);
   XML_SetElementHandler(xml->parser, on_start, on_end);
+  XML_SetCommentHandler(xml->parser, on_comment);
+  XML_SetProcessingInstructionHandler(xml->parser, on_instruction);
   XML_SetStartDoctypeDeclHandler(xml->parser, on_doctype);
   *out = xml;
   return ORB_OK;
@@ -114,9 +139,9 @@ orb_status orb_xml_parse(orb_xml *xml, const unsigned char *bytes, size_t size, 
     xml->given += (int64_t)piece;
     bytes += piece;
     size -= piece;
+    /* The index is that of the last complete token, so an unfinished one behind it is longer than ORB_XML_TOKEN. */
     if (xml->given - XML_GetCurrentByteIndex(xml->parser) > 2 * ORB_XML_TOKEN) {
-      return orb_build_malformed(xml->ctx, 1, orb_xml_line(xml), "A tag or comment of the XML has more than %d bytes.",
-                                 ORB_XML_TOKEN);
+      return refuse_token(xml);
     }
   } while (size > 0);
   return ORB_OK;

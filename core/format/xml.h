@@ -1,7 +1,6 @@
 /* XML by Expat, under the budget and the limits of a reader: elements with their attributes, in order. Names are
  * "NAMESPACE|name", or "name" without a namespace. A document type is refused, so no entity expands; elements nest at
- * most ORB_XML_DEPTH deep. A tag, comment or instruction may have ORB_XML_TOKEN bytes; one of more than three times as
- * many is refused. */
+ * most ORB_XML_DEPTH deep. A tag, comment or instruction has at most ORB_XML_TOKEN bytes. */
 #ifndef ORB_FORMAT_XML_H
 #define ORB_FORMAT_XML_H
 

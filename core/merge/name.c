@@ -19,23 +19,23 @@
 
 /* Shares of the height: how high feet reach and landmarks on feet lie, and where the shins are. */
 static const double FEET = 0.12, ON_FEET = 0.22, SHINS_FROM = 0.14, SHINS_TO = 0.24;
-static const double SMALL_FOOT = 0.15; /* of the area of the largest foot: smaller pieces are none */
-static const double LONGER = 1.3;      /* a body on four feet than it is wide, by standard deviations */
-static const double APART = 0.06;      /* at least, two feet beside each other: of the height */
-static const double LEANS = 0.04;      /* at least, the upper half: of the distance from hind to front feet */
+static const double SMALL_FOOT = 0.15; /* of the area of the largest foot: smaller pieces are not feet */
+static const double LONGER = 1.3; /* times as long as wide (by standard deviations): the least of a body on four feet */
+static const double APART = 0.06; /* least distance of two feet beside each other, of the height */
+static const double LEANS = 0.04; /* how far the upper half leans at least, of the distance from hind to front feet */
 static const double THIGHS_FROM = 0.3, THIGHS_TO = 0.4,
                     STRAIGHT = 0.03; /* thighs are above the shins, or it crouches */
-static const double TOES = 0.01;     /* at least, feet before shins: of the height */
-static const double TALLER = 1.5;    /* up than another axis that has two feet as well */
-static const double AROUND = 0.1;    /* of the diagonal: the surface around a landmark, */
+static const double TOES = 0.01;     /* how far feet lie in front of the shins at least, of the height */
+static const double TALLER = 1.5;    /* times as high along `up` as along another axis with two feet, at least */
+static const double AROUND = 0.1;    /* of the diagonal: how large the surface around a landmark is, */
 static const double THIN = 0.6;      /* which is a tail below this share of a disc */
-static const double DEEP = 0.6;      /* at most, a body on two feet from front to back: of the height */
+static const double DEEP = 0.6;      /* how deep a body on two feet is at most from front to back, of the height */
 static const double TOP = 0.93;      /* of the height: where its top begins */
-static const double ALIKE = 0.7;     /* at least, how far one side of it reaches: of the other */
+static const double ALIKE = 0.7;     /* how far one side of the top reaches at least, of the other side */
 static const double ARM = 0.2,
                     HEAD = 0.1; /* of the height, from the middle plane: hands are farther, a head is nearer */
 
-static const double SYMMETRIC = 0.025; /* of the diagonal: the mean distance of the surface from its mirror image */
+static const double SYMMETRIC = 0.025; /* of the diagonal: the mean distance from the mirror image is below it */
 
 enum { FEET_MAX = 4, SAMPLES = 500 };
 

@@ -258,7 +258,7 @@ static orb_status close_all(fill *f, orb_fill how, int fans, int64_t *loops) {
   return status;
 }
 
-/* Matches the edges anew, with the new faces. */
+/* Matches the edges again, with the new faces. */
 static orb_status grow_surface(orb_surface *s) {
   const int32_t faces = s->mesh->triangle_count;
   orb_free(s->ctx, s->twin);

@@ -20,7 +20,7 @@ enum { ADMIN_WORD = 512, ADMIN_FLAGS = 9, ADMIN_VERBS = 6, ADMIN_SECRET = 96 };
 typedef struct admin_verb {
   const char *name; /* at most 7 bytes; NULL ends the table */
   int named;        /* the command takes NAME */
-  int shows_secret; /* the new secret is shown, this one time */
+  int shows_secret; /* the command shows the new secret, this one time */
 } admin_verb;
 
 typedef struct admin_flag {

@@ -35,7 +35,7 @@ struct deliverer {
   int count;
   delivery_row ended[DELIVER_MOST]; /* to be recorded, without bodies */
   int ended_count;
-  int told_denied; /* the log has the line about it */
+  int told_denied; /* which has been logged */
 };
 
 static int64_t now_ms(void) {

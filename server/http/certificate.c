@@ -125,7 +125,7 @@ static int retrieve(gnutls_session_t session, const struct gnutls_cert_retr_st *
   *key = one->key;
   *ocsp = NULL;
   *ocsp_count = 0;
-  *flags = 0; /* they stay ours */
+  *flags = 0; /* the daemon keeps them */
   return 0;
 }
 

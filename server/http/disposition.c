@@ -22,7 +22,7 @@ static const char *append_name(const char *at, char *out, size_t *n) {
   while (*at && *at != '"') {
     size_t size = 1;
     char c = *at;
-    if (c == '\\') { /* \", \\ and control characters: none belongs into a file name */
+    if (c == '\\') { /* \", \\ and control characters: none belongs in a file name */
       size = at[1] == 'u' ? 6 : 2;
       c = '_';
     } else if ((unsigned char)c < 0x20 || strchr("/:*?<>|\x7f", c)) {
@@ -59,7 +59,8 @@ void disposition_name(const char *description, char out[DISPOSITION_NAME]) {
     }
     at = append_name(at + sizeof after - 1, out, &n);
   }
-  if (n > 0 && (out[0] == '.' || out[0] == '-')) { /* no hidden file, and no option of a command */
+  if (n > 0 &&
+      (out[0] == '.' || out[0] == '-')) { /* the name of a hidden file, or one that a command takes for an option */
     out[0] = '_';
   }
   memcpy(out + n, n ? ".glb" : "asset.glb", n ? 5 : 10);

@@ -81,7 +81,7 @@ static size_t zstd_into(const void *bytes, size_t size, int level, void *out, si
 }
 
 int encode_bytes(coding which, const void *bytes, size_t size, int once, void **out, size_t *out_size) {
-  void *room = size > 0 ? malloc(size) : NULL; /* no more: what does not fit is not smaller */
+  void *room = size > 0 ? malloc(size) : NULL; /* no more room is needed: a result that does not fit is not smaller */
   *out_size = !room                  ? 0
               : which == CODING_GZIP ? gzip_into(bytes, size, once ? GZIP_ONCE : GZIP_LEVEL, room, size)
                                      : zstd_into(bytes, size, once ? ZSTD_ONCE : ZSTD_LEVEL, room, size);

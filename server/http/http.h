@@ -75,7 +75,7 @@ typedef struct server {
   int64_t decoding;    /* bytes held by the decoders of bodies; __atomic */
   int64_t started_ms;  /* orb_clock_ms() */
   int needs_token;
-  int works_only; /* the role work: answers only what is about the node itself */
+  int works_only; /* the role work: answers only requests about the node itself */
   int unfit;      /* the catalogue refused to open: see STORE_UNFIT */
   deliverer *outbox;
   scrub *scrub;                            /* NULL: off */
@@ -101,7 +101,7 @@ typedef struct request request;
 struct request {
   task away_task; /* first: a task is the request */
   void (*away)(request *r);
-  tasks *next_pool; /* where the request goes on after this task; NULL: nowhere */
+  tasks *next_pool; /* the task that takes the request after this one; NULL: none */
   server *srv;
   struct MHD_Connection *connection;
   watched *watched; /* the connection; may be NULL */
@@ -119,7 +119,7 @@ struct request {
   signer *signer;    /* referenced; NULL: the URL is not signed */
   int64_t expires;   /* of the signature, Unix time in seconds */
   int64_t retry_s;   /* for Retry-After; 0: the usual */
-  int is_unverified; /* the file to send could not be compared with its hash, or not be moved away */
+  int is_unverified; /* the file to send could not be compared with its hash, or could not be moved away */
   int is_away;       /* because S3 does not answer */
   int begun;         /* the headers have arrived */
   int has_body, head;

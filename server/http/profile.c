@@ -185,7 +185,7 @@ static int take_flight(request *r, flight *mine) {
   return at == NULL;
 }
 
-/* Ends the flight. The requests that waited look again: they find the profile, or one of them tries next. */
+/* Ends the flight. The waiting requests check again. They find the profile, or one of them tries to make it. */
 static void land(request *r, flight *mine) {
   pthread_mutex_lock(&flights.lock);
   flight **at = &flights.first;

@@ -9,7 +9,8 @@ enum { VERIFIED = 4096, TARGET_HASH = crypto_shorthash_siphashx24_BYTES };
 
 /* A target whose signature fits its key's current secret. A visitor's HMAC takes 4 µs, a tenth of the whole answer. */
 typedef struct verified {
-  unsigned char hash[TARGET_HASH]; /* of the target with its signature, keyed: nobody can aim at a slot or its value */
+  unsigned char
+      hash[TARGET_HASH]; /* of the target with its signature, keyed: so that no caller can choose a slot or its value */
   unsigned generation;
 } verified;
 

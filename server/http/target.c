@@ -35,7 +35,7 @@ static void refuse(struct MHD_Connection *connection, const char *number, const 
     write_bytes(all.data, all.size, fd->connect_fd, tls ? tls->tls_session : NULL);
   }
   if (fd) {
-    shutdown(fd->connect_fd, SHUT_WR); /* what the library would send fails */
+    shutdown(fd->connect_fd, SHUT_WR); /* so that nothing that the library sends later reaches the client */
   }
   api_text_free(&all);
   api_text_free(&body);

@@ -36,7 +36,7 @@ void watched_answer(watched *c);
 void watched_done(watched *c); /* the next request may come */
 void watched_linger(watched *c);
 
-/* What the client's address has left. */
+/* The limits of the client's address, and what is left of them. */
 typedef struct allowance {
   int limited;                        /* 0: the address has no limits */
   int refused;                        /* 0, 1: too many requests, 2: too many connections */

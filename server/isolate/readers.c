@@ -6,8 +6,8 @@
 
 #include "wake.h"
 
-/* READERS: of all tenants together. IDLE_MS: a client that sends file after file over a long line comes back within it.
- * LOOK_MS: how soon an idle one ends once others lack memory. */
+/* READERS: of all tenants together. IDLE_MS: within it, a client far away that sends file after file sends the next
+ * one. LOOK_MS: how soon an idle one ends once others lack memory. */
 enum { READERS = 8, IDLE_MS = 250, LOOK_MS = 50 };
 enum { FREE, BUSY, IDLE, OVER }; /* over: the thread ends it */
 
@@ -36,7 +36,7 @@ int reader_end(reader *r) {
   return status;
 }
 
-/* Others have asked in vain for memory of this kind since it started. */
+/* Whether others have asked in vain for memory of this kind since the process started. */
 static int is_scarce(const reader *r) {
   return budget_shortages(own.memory, r->part) != r->shortages;
 }
@@ -113,7 +113,7 @@ static int64_t memory_of(budget_part part) {
                               : budget_for_file(own.memory, part, READER_BYTES);
 }
 
-/* Under the lock. One that has read files of this tenant only, or a free place; NULL: neither. */
+/* Under the lock. Finds a process that has read only files of this tenant, or else a free place; NULL: neither. */
 static reader *find(const char *tenant, budget_part part) {
   reader *place = NULL, *oldest = NULL;
   for (int i = 0; i < READERS; i++) {

@@ -2,9 +2,9 @@
  * process serves one tenant.
  *
  * Such a process is confined like any other. As long as it lives, it holds the memory of the largest file that it may
- * get. It ends when no file of its tenant comes for a moment, after READER_FILES files or READER_WORK_MS
- * of work, and as soon as others lack memory. It never gets a file of another tenant. If it dies after it has read
- * other files, one of those may be the cause, so the caller repeats the check in a process of its own.
+ * get. It ends when its tenant sends no file for a moment, after READER_FILES files or READER_WORK_MS of work, and as
+ * soon as others lack memory. It never gets a file of another tenant. If it dies after it has read other files, one of
+ * those may be the cause, so the caller repeats the check in a process of its own.
  */
 #ifndef ORB_ISOLATE_READERS_H
 #define ORB_ISOLATE_READERS_H

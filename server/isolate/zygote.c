@@ -67,8 +67,9 @@ static int hear(int fd, int *number, int passed[PASSED_MOST]) {
 
 /* ---- the zygote ---- */
 
-/* Libraries of which readers and jobs call nothing: HTTP, TLS, databases, and what these need. The forked processes
- * have them not: they would copy and end several times as many mappings, which took more time than a small job. */
+/* Libraries of which readers and jobs call nothing: HTTP, TLS, databases, and what these need. The forked processes do
+ * not have these libraries. With them, they would copy and release several times as many mappings, which took longer
+ * than a small job. */
 static const char *const absent[] = {"libmicrohttpd.",  "libgnutls.",  "libsqlite3.", "libpq.",        "libcurl",
                                      "libseccomp.",     "libp11-kit.", "libidn2.",    "libunistring.", "libtasn1.",
                                      "libnettle.",      "libhogweed.", "libgmp.",     "libssl.",       "libcrypto.",
@@ -77,7 +78,7 @@ static const char *const absent[] = {"libmicrohttpd.",  "libgnutls.",  "libsqlit
                                      "libk5crypto.",    "libcom_err.", "libsasl2.",   "libkeyutils.",  "libresolv."};
 
 #if SANDBOX_SANITIZED
-#define FORK fork /* their runtimes follow it */
+#define FORK fork /* the runtimes of the sanitizers handle fork() */
 enum { LEAVES_OUT = 0 };
 #else
 #define FORK _Fork /* without the handlers of those libraries */
@@ -115,7 +116,7 @@ static void on_death(int number) {
   int saved = errno;
   ssize_t written = write(deaths[1], "", 1);
   (void)number;
-  (void)written; /* if the pipe is full, the loop looks anyway */
+  (void)written; /* if the pipe is full, the loop wakes anyway */
   errno = saved;
 }
 
@@ -143,7 +144,7 @@ _Noreturn static void become_process(int channel, pid_t zygote, void (*work)(int
   signal(SIGCHLD, SIG_DFL);
   (void)syscall(SYS_close_range, ISOLATE_FD + 1, ~0u, 0); /* those of other processes */
   int score = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
-  if (score >= 0) { /* where memory is short, this process dies before the daemon */
+  if (score >= 0) { /* if memory is short, the kernel kills this process before the daemon */
     ssize_t written = write(score, "800", 3);
     (void)written;
     close(score);
@@ -177,7 +178,7 @@ static void fork_one(int passed[PASSED_MOST], void (*work)(int channel)) {
   }
 }
 
-/* What holds here, tried in a process that ends at once. */
+/* Finds out which confinements this kernel has, in a process that ends at once. */
 static int try_sandbox(void) {
   int status = 0;
   pid_t pid = FORK();

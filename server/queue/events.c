@@ -131,7 +131,7 @@ void event_write(api_text *out, int64_t number, const char *type, const char *js
 int64_t queue_events_write(queue *q, job *j, int64_t after, api_text *out, int *ended) {
   pthread_mutex_lock(&q->lock);
   *ended = api_job_ended(j->row.state);
-  /* An attempt that was given back on another node had sent more events than it stored: their numbers came again. */
+  /* An attempt that another node gave back had sent more events than it stored, and their numbers were used again. */
   after = *ended && after > j->last_event ? j->last_event - 1 : after;
   for (int i = 0; i < j->event_count; i++) {
     if (j->events[i].number > after) {

@@ -64,8 +64,9 @@ static store_result end_job(queue *q, job *j, job_end *end, int worked) {
   FAULT_POINT("after-finish");
   if (stored == STORE_OK) {
     pthread_mutex_lock(&q->lock);
-    const int left = !worked && q->shared && j->taken; /* a worker that has lost it shows the end when it leaves it */
-    if (api_job_ended(j->row.state) || left) {         /* a notice was faster */
+    const int left =
+        !worked && q->shared && j->taken;      /* a worker that has lost the job shows the end when it leaves the job */
+    if (api_job_ended(j->row.state) || left) { /* a notice has brought the end before this thread */
       if (left && j->ctx) {
         orb_context_cancel(j->ctx);
       } else if (worked) {

@@ -10,11 +10,12 @@
 
 enum { BUCKETS = 8192, KEEP_ENDED = 512, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
 static const int64_t LARGE = 300000; /* a job with more triangles than this is large */
-/* Estimate of a running job's memory: so much for each triangle, and a base, at most a share of what all may have. A
- * job that needs more runs again with all of it. */
+/* Estimate of a running job's memory: a base and so many bytes for each triangle, but at most a share of what all jobs
+ * may have. A job that needs more runs again with all of it. */
 static const int64_t BYTES_A_TRIANGLE = 1024, BYTES_OF_JOB = INT64_C(64) << 20, SHARE_OF_JOB = 8;
 static const int64_t TRIANGLES_A_MS = 100; /* estimate of a worker's speed, charged until the time is known */
-/* A job goes back into the queue for so long after the store has failed to end it, and after it failed to begin it. */
+/* How long a job waits in the queue after the store failed to record its end, and after it failed to record its start.
+ */
 static const int64_t RETRY_AFTER_STORE_MS = 5000, RETRY_SOON_MS = 1000;
 static const int64_t EVENT_STRIDE = 1000000; /* event numbers of an attempt start above attempt times this */
 
@@ -59,7 +60,8 @@ struct job {
 
 struct queue {
   pthread_mutex_t lock;
-  pthread_cond_t work, fetch_work, committed, timer_wake; /* fetch_work: for the threads that fetch */
+  pthread_cond_t work, guest_work, fetch_work; /* for the threads of each lane; where jobs are shared, `work` for all */
+  pthread_cond_t committed, timer_wake;
   queue_options options;
   catalogue *cat;
   job *by_id[BUCKETS], *by_key[BUCKETS];
@@ -100,13 +102,21 @@ static inline int fetches(const job *j) {
 static inline int64_t used_ms(const job *j, int64_t now) {
   return now > j->taken_at ? now - j->taken_at : 0;
 }
-/* Something may be there to take. Threads whose jobs there are not sleep on. */
+/* Something may be there to take. All threads of a lane may take the same jobs, so one of them looks. If it takes a
+ * job, it wakes the next. */
 static inline void wake_workers(queue *q) {
-  if (q->shared || q->unfinished > q->unfinished_fetches || q->stopping) { /* shared: all wait for that */
+  if (q->shared || q->stopping) {
     pthread_cond_broadcast(&q->work);
-  }
-  if (q->unfinished_fetches > 0 || q->stopping) {
+    pthread_cond_broadcast(&q->guest_work);
     pthread_cond_broadcast(&q->fetch_work);
+    return;
+  }
+  if (q->unfinished > q->unfinished_fetches) {
+    pthread_cond_signal(&q->work);
+    pthread_cond_signal(&q->guest_work);
+  }
+  if (q->unfinished_fetches > 0) {
+    pthread_cond_signal(&q->fetch_work);
   }
 }
 void owner_enter(queue *q, job *j); /* sets j->owner */

@@ -29,6 +29,7 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   q->cat = cat;
   pthread_mutex_init(&q->lock, NULL);
   pthread_cond_init(&q->work, NULL);
+  pthread_cond_init(&q->guest_work, NULL);
   pthread_cond_init(&q->fetch_work, NULL);
   pthread_cond_init(&q->committed, NULL);
   wake_init(&q->timer_wake);

@@ -87,7 +87,7 @@ static void take_over(queue *q) {
   api_text_free(&text);
 }
 
-/* What notices may have missed. */
+/* Looks for changes whose notices were lost. */
 static void look_around(queue *q) {
   sharing *s = q->shared;
   shared_numbers numbers;

@@ -10,7 +10,7 @@
 
 enum { PAGE = 64, MARKS = 50 };
 
-/* Stage and progress, as the newest event tells them. */
+/* Takes stage and progress from the newest event. */
 static void show_event(job *j, const char *json) {
   api_json_error error;
   cJSON *event = api_json_parse(json, strlen(json), &error);
@@ -23,7 +23,7 @@ static void show_event(job *j, const char *json) {
   cJSON_Delete(event);
 }
 
-/* Takes what the row says; the job does not run here and has not ended in memory. */
+/* Brings a job up to date with its row. The job does not run here and has not ended in memory. */
 static void take_row(queue *q, job *j, job_row *row) {
   j->row.state = row->state;
   j->row.attempt = row->attempt;

@@ -8,7 +8,7 @@
 #include "log.h"
 #include "store/owners.h"
 
-/* The free bytes that must be left, as a multiple of an alignment's: the result that follows needs them more. */
+/* An alignment is kept only if so many times its bytes are free: the result that follows needs the space more. */
 enum { ROOM = 16 };
 
 int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const resource *row,

@@ -10,15 +10,17 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "api/sha256.h"
 #include "api/text.h"
 #include "log.h"
 #include "store/s3_keys.h"
 #include "wake.h"
 
 enum {
-  TRIES = 4,       /* of a request, with 0.7 s of pauses in the mean: S3's own hiccups are shorter */
-  PROBE_MS = 1000, /* between two questions whether S3 is back */
-  READ_TRIES = 3,  /* of a whole object that came with wrong bytes */
+  TRIES =
+      4, /* of a request. The pauses between them take 0.7 s on average, longer than the usual interruptions of S3 */
+  PROBE_MS = 1000, /* between two checks whether S3 is back */
+  READ_TRIES = 3,  /* of an object that arrived with wrong bytes */
   BLOCK = 1 << 18,
 };
 static const char owner_name[] = "orbmorph-owner";
@@ -45,7 +47,7 @@ int bucket_hash(int fd, uint64_t from, uint64_t size, char out[65]) {
       n = pread(fd, block, left, (off_t)(from + done));
     } while (n < 0 && errno == EINTR);
     if (n > 0) {
-      crypto_hash_sha256_update(&state, block, (unsigned long long)n);
+      api_sha256_add(&state, block, (size_t)n);
     }
   }
   crypto_hash_sha256_final(&state, digest);
@@ -120,7 +122,7 @@ static void probe(object_bucket *b) {
   s3_answer answer;
   s3_keys keys;
   const char *why;
-  if (*b->keys && s3_keys_read(b->keys, &keys, &why)) { /* temporary ones may have been replaced */
+  if (*b->keys && s3_keys_read(b->keys, &keys, &why)) { /* temporary keys may have been replaced */
     s3_use_keys(b->store, &keys);
     sodium_memzero(&keys, sizeof keys);
   }
@@ -168,7 +170,7 @@ static store_result read_options(const bucket_options *options, object_bucket *b
   return STORE_OK;
 }
 
-/* Reads the owner; explains what does not fit. */
+/* Reads the owner, and logs why the bucket cannot be used. */
 static store_result read_owner(object_bucket *b, char owner[BUCKET_OWNER + 1]) {
   s3_answer answer;
   const s3_place *p = &b->options.place;
@@ -308,7 +310,9 @@ static store_result complete(object_bucket *b, const char *name, const char *que
     s3_answer answer;
     s3_send(b->store, &request, &answer);
     result = meaning(&answer);
-    if (result == STORE_OK && answer.text && strstr(answer.text, "<Error>")) { /* S3 sends 200 before it is done */
+    if (result == STORE_OK && answer.text &&
+        strstr(answer.text,
+               "<Error>")) { /* S3 sends status 200 before it has joined them, and an error may follow in the text */
       log_warn("S3 could not put the parts of %s together: %.300s", name, answer.text);
       result = STORE_AWAY;
     }
@@ -354,7 +358,7 @@ static store_result put_parts(object_bucket *b, const char *name, int fd, uint64
   result = result == STORE_OK && list.failed ? STORE_ERROR : result;
   result = result == STORE_OK ? complete(b, name, query, list.data, sha) : result;
   api_text_free(&list);
-  if (result != STORE_OK) { /* what cannot be aborted now, a lifecycle rule of the bucket removes */
+  if (result != STORE_OK) { /* if this fails too, a lifecycle rule of the bucket removes the parts */
     const s3_request abort = {.method = "DELETE", .key = name, .query = query, .to = -1, .tries = 1};
     ask_only(b, &abort);
   }
@@ -388,7 +392,7 @@ store_result bucket_get(object_bucket *b, const char *name, int fd, uint64_t *si
     if (result != STORE_OK) {
       break;
     }
-    if (!answer.meta[0]) { /* nothing says that it is damaged: it stays */
+    if (!answer.meta[0]) { /* without a hash it is not known to be damaged, so it stays */
       log_error(
           "S3 answers with %s, but without its hash (x-amz-meta-sha256): something else answers in its place, or it "
           "was "

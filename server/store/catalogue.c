@@ -8,19 +8,25 @@
 
 #include "faults.h"
 #include "log.h"
+#include "orbmorph/context.h"
 #include "store/catalogue.h"
 #include "store/move_mark.h"
 #include "store/object_lock.h"
 #include "store/transactions.h"
+#include "wake.h"
 
-enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node, or met it */
+enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node or conflicted with it */
 
-/* A waiting write. That of catalogue_write() lies on its caller's stack. */
+/* How long events and times of use wait for a write whose caller waits. Their own commit, with its fdatasync(), costs
+ * more than all else that a small job writes. The end of such a job takes its events along. */
+enum { GATHER_MS = 20 };
+
+/* A waiting write. catalogue_write() keeps it on its caller's stack. */
 typedef struct pending {
   struct pending *next;
   write_fn fn;
   void *arg;
-  int later;      /* of catalogue_write_later(): the writer frees it */
+  int later;      /* nobody waits for it: the writer frees it */
   int64_t number; /* see object_lock_check() */
   int done, code;
 } pending;
@@ -29,8 +35,9 @@ struct catalogue {
   pthread_mutex_t lock;
   pthread_cond_t wake, committed, reader_free;
   pending *first, **last;
+  int urgent; /* of the waiting writes, all but those of catalogue_write_gathered() */
   int stopping, started;
-  int shared; /* other nodes use it, too */
+  int shared; /* other nodes use it as well */
   pthread_t thread;
   database writer;
   database readers[DATABASE_READERS];
@@ -55,7 +62,7 @@ static store_result result_of(int code) {
   }
 }
 
-/* Nodes write one after another: the same that one writer thread ensures within a process. */
+/* Nodes write one after another, as the writers of one process do through its writer thread. */
 static int begin(const catalogue *cat, database *db) {
   char sql[96];
   snprintf(sql, sizeof sql, "BEGIN; SELECT pg_advisory_xact_lock(%d, hashtext(current_schema()))", SQL_LOCK_WRITES);
@@ -102,17 +109,24 @@ static int run_batch(catalogue *cat, pending *batch) {
   return code;
 }
 
+/* Under the lock: waits for the next batch. Returns NULL if the writer stops and nothing is left. */
+static pending *wait_for_batch(catalogue *cat) {
+  while (!cat->first && !cat->stopping) {
+    pthread_cond_wait(&cat->wake, &cat->lock);
+  }
+  const int64_t until = orb_clock_ms() + GATHER_MS;
+  for (int64_t left = GATHER_MS; cat->first && !cat->urgent && !cat->stopping && left > 0;) {
+    wake_wait_ms(&cat->wake, &cat->lock, left);
+    left = until - orb_clock_ms();
+  }
+  return cat->first;
+}
+
 static void *writer_main(void *argument) {
   catalogue *cat = argument;
   pthread_mutex_lock(&cat->lock);
-  for (;;) {
-    while (!cat->first && !cat->stopping) {
-      pthread_cond_wait(&cat->wake, &cat->lock);
-    }
-    pending *batch = cat->first;
-    if (!batch) {
-      break;
-    }
+  for (pending *batch; (batch = wait_for_batch(cat));) {
+    cat->urgent = 0;
     cat->first = NULL;
     cat->last = &cat->first;
     pthread_mutex_unlock(&cat->lock);
@@ -127,7 +141,7 @@ static void *writer_main(void *argument) {
         free(p->arg);
         free(p);
       } else {
-        p->done = 1; /* its thread may now return, and p with it */
+        p->done = 1; /* its thread may now return, which ends the life of p */
       }
     }
     pthread_cond_broadcast(&cat->committed);
@@ -136,16 +150,19 @@ static void *writer_main(void *argument) {
   return NULL;
 }
 
-static void enqueue(catalogue *cat, pending *p) {
+static void enqueue(catalogue *cat, pending *p, int urgent) {
+  if (urgent || !cat->first) {
+    pthread_cond_signal(&cat->wake);
+  }
   *cat->last = p;
   cat->last = &p->next;
-  pthread_cond_signal(&cat->wake);
+  cat->urgent |= urgent;
 }
 
 static store_result write_and_wait(catalogue *cat, write_fn fn, void *arg, int64_t number) {
   pending p = {.fn = fn, .arg = arg, .number = number};
   pthread_mutex_lock(&cat->lock);
-  enqueue(cat, &p);
+  enqueue(cat, &p, 1);
   while (!p.done) {
     pthread_cond_wait(&cat->committed, &cat->lock);
   }
@@ -161,7 +178,7 @@ store_result catalogue_write_held(catalogue *cat, write_fn fn, void *arg) {
   return write_and_wait(cat, fn, arg, object_lock_number());
 }
 
-void catalogue_write_later(catalogue *cat, write_fn fn, void *arg) {
+static void write_later(catalogue *cat, write_fn fn, void *arg, int urgent) {
   pending *p = calloc(1, sizeof *p);
   if (!p) {
     free(arg);
@@ -169,8 +186,16 @@ void catalogue_write_later(catalogue *cat, write_fn fn, void *arg) {
   }
   *p = (pending){.fn = fn, .arg = arg, .later = 1};
   pthread_mutex_lock(&cat->lock);
-  enqueue(cat, p);
+  enqueue(cat, p, urgent);
   pthread_mutex_unlock(&cat->lock);
+}
+
+void catalogue_write_later(catalogue *cat, write_fn fn, void *arg) {
+  write_later(cat, fn, arg, 1);
+}
+
+void catalogue_write_gathered(catalogue *cat, write_fn fn, void *arg) {
+  write_later(cat, fn, arg, cat->shared); /* other nodes wait for events */
 }
 
 database *catalogue_reader(catalogue *cat) {
@@ -194,7 +219,7 @@ void catalogue_reader_done(catalogue *cat, database *db) {
   pthread_mutex_unlock(&cat->lock);
 }
 
-/* Whether the catalogue is whole, and not the half of one. */
+/* Whether the catalogue is complete, and not one that a move has filled in part. */
 static int check_whole(database *db) {
   char mark[MOVE_MARK];
   int code = move_mark_read(db, mark);
@@ -246,7 +271,7 @@ store_result catalogue_open_shared(const char *where, int shared, catalogue **ou
   cat->last = &cat->first;
   cat->shared = shared;
   pthread_mutex_init(&cat->lock, NULL);
-  pthread_cond_init(&cat->wake, NULL);
+  wake_init(&cat->wake);
   pthread_cond_init(&cat->committed, NULL);
   pthread_cond_init(&cat->reader_free, NULL);
   snprintf(cat->path, sizeof cat->path, database_is_url(where) ? "%s" : "%s/catalogue.sqlite", where);

@@ -1,5 +1,5 @@
-/* The store: rows in SQLite or PostgreSQL (the catalogue) and files (objects). In: rows and bytes from
- * server/http, server/queue and server/worker. Out: the same, also after a crash.
+/* The store: rows in SQLite or PostgreSQL (the catalogue) and files (objects). server/http, server/queue and
+ * server/worker write rows and bytes and read them back, also after a crash.
  *
  * Reading order:
  *   catalogue.h   rows of meshes, embeddings, supermeshes, jobs and events: the interface
@@ -104,19 +104,20 @@ int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]);
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* Functions that list return the number of rows filled, or −1, and fill nothing, if the rows cannot be read. */
-/* Newest first, landmarks without their places, only those before sequence number `before` (0: all). */
+/* Lists the newest rows first, and only those before sequence number `before` (0: all). Landmarks come without their
+ * places. */
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out);
-/* What a list is limited to; NULL: not limited. */
+/* Which rows a list has. NULL: no condition. */
 typedef struct list_filter {
   const char *prefix;      /* of the id: hexadecimal digits */
   const char *mesh, *name; /* supermeshes with a shape of this mesh, and with one of this name */
 } list_filter;
-/* Like catalogue_list(), only what the filter lets through and, unless view is "", what this tenant owns. Reads only
- * matching rows, through an index; with a mesh and a name, the rows of that mesh. */
+/* Like catalogue_list(), but lists only rows that match the filter and, unless view is "", that this tenant owns. Reads
+ * only matching rows, through an index; with a mesh and a name, the rows of that mesh. */
 int catalogue_list_some(catalogue *cat, resource_kind kind, const char *view, const list_filter *filter, int64_t before,
                         int limit, resource *out);
-/* Derived resources last used before a Unix time in ms, least recently used first, without the first `skip`;
- * for eviction. */
+/* For eviction: lists the derived resources that were last used before a Unix time in ms, least recently used first.
+ * Passes over the first `skip`. */
 int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out);
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id); /* does not wait for the commit */
 /* Notes that a profile of a supermesh's asset has become an object, and adds its bytes to the row's. STORE_NOT_FOUND:
@@ -144,7 +145,7 @@ typedef struct job_row {
   int64_t cost;             /* triangles */
   char owner[64];           /* the tenant that requested it */
   char trace[TRACE_PARENT]; /* the span of the request; "": none */
-  char charged[64];         /* the signing key that its work counts for; "": none */
+  char charged[64];         /* the signing key whose limits its work counts against; "": none */
   char result[API_ID_SIZE]; /* of a mesh from a URL that is stored; "": the key is the id of the result */
   char *request, *problem;
   int64_t created, started, finished;
@@ -160,9 +161,9 @@ store_result catalogue_job_list_it(catalogue *cat, const char *id); /* sets `lis
  * process runs jobs, so any job that is running in the catalogue at the start belongs to a dead process
  * (catalogue_recover()). Several nodes claim with catalogue_claim_next() instead, which gives a lease (shared.h). */
 store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, int alone, int64_t now);
-/* running → queued again; its attempt does not count. */
+/* running → queued; its attempt does not count. */
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
-/* running → queued again: its process died. counts: its crash, see queue_crashed(). */
+/* running → queued: its process died. counts: the crash counts against the job, see queue_crashed(). */
 store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int counts, int suspect, int64_t now);
 /* How a job ends. */
 typedef struct job_end {
@@ -172,8 +173,8 @@ typedef struct job_end {
   const char *mesh;       /* of a mesh from a URL: its id; NULL: none */
   int64_t now, event;     /* event: the number of the last event */
   const char *event_json; /* of the last event: the job */
-  const char *owner;      /* to whom worker_ms counts */
-  int64_t worker_ms;      /* for which a worker has had it */
+  const char *owner;      /* the tenant that worker_ms counts for */
+  int64_t worker_ms;      /* how long a worker had it */
 } job_end;
 /* Ends a job, stores its result and announces it to its webhooks in the same transaction. STORE_CONFLICT if `attempt`
  * is no longer the job's current one. */
@@ -183,14 +184,15 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out);
 enum { CATALOGUE_UNFINISHED = -2 }; /* as a state: queued or running */
 int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,
                        job_row *out);
-/* After a crash: queues jobs that were running again, as suspects, and fails those that crashed alone `most_crashes`
- * times. most_crashes 0: the crash was not theirs; they are queued as they were. */
+/* After a crash: queues the jobs that were running, as suspects, and fails those that crashed alone `most_crashes`
+ * times. most_crashes 0: the jobs did not cause the crash, so they are queued without suspicion. */
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
-/* Where several nodes share the jobs: queues those of this node's last life ("": it has none). */
+/* Where several nodes share the jobs: queues the jobs that this node ran before its restart. last_life: its name then;
+ * "": none. */
 store_result catalogue_recover_own(catalogue *cat, const char *last_life);
-/* The same as catalogue_recover() for jobs of nodes whose lease has passed; does not wait for the commit. */
+/* The same as catalogue_recover() for jobs of nodes whose lease has expired; does not wait for the commit. */
 void catalogue_recover_lost(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
-/* Unfinished jobs, oldest first, only those after sequence number `after`. */
+/* Lists unfinished jobs after sequence number `after`, oldest first. */
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out);
 
 /* The number of ended jobs, −1 if they cannot be counted. O(ended jobs), through an index. */
@@ -205,7 +207,7 @@ typedef struct event_row {
   char type[16];
   char *json;
 } event_row;
-/* Events of a job, by number, only those after `after`. */
+/* Lists the events of a job after number `after`, in order. */
 int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, event_row *out);
 
 /* For --check-data. */

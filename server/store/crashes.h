@@ -1,5 +1,6 @@
-/* Crashes of processes that did only one thing, counted by the key of that work: of a job, or of a checked mesh. The
- * counts outlive the jobs, so a file that crashes its process is refused in the end. */
+/* Counts the crashes of processes that did only one piece of work. Each count belongs to the key of that work: the key
+ * of a job, or the id of a checked mesh. The counts outlive the jobs, so the daemon finally refuses a file that crashes
+ * its process each time. */
 #ifndef ORB_STORE_CRASHES_H
 #define ORB_STORE_CRASHES_H
 
@@ -20,7 +21,7 @@ void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenan
 /* Whether the work of this key is refused. */
 int catalogue_crashed(catalogue *cat, const char *key);
 /* Forgets the crashes of all keys that begin with `name`, or of the tenant `name`, or of work on the mesh `name`.
- * STORE_NOT_FOUND: none. */
+ * STORE_NOT_FOUND: there are none. */
 store_result catalogue_crash_clear(catalogue *cat, const char *name);
 /* Appends a line for each key, the latest first; −1: it cannot be read. */
 int catalogue_crash_list(catalogue *cat, api_text *out);

@@ -7,7 +7,7 @@
 #include "log.h"
 #include "store/postgresql_schema.h"
 
-/* The schema in SQLite: each entry brings it from version i to i + 1. A step goes to postgresql_schema.c, too. */
+/* The schema in SQLite: each entry brings it from version i to i + 1. Add each step to postgresql_schema.c as well. */
 static const char *const migrations[] = {
     "CREATE TABLE resource(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
     " sha TEXT NOT NULL, json TEXT NOT NULL, bytes INTEGER NOT NULL, created INTEGER NOT NULL, used INTEGER NOT NULL,"
@@ -125,7 +125,7 @@ static const char *const migrations[] = {
     /* Deaths of processes, by the key of their work. */
     "CREATE TABLE crash(key TEXT PRIMARY KEY, mesh TEXT NOT NULL, tenant TEXT NOT NULL, count INTEGER NOT NULL,"
     " last INTEGER NOT NULL) WITHOUT ROWID;",
-    /* Until when a token is valid, as a Unix time in seconds; 0: always. */
+    /* When a token expires, as a Unix time in seconds; 0: never. */
     "ALTER TABLE token ADD COLUMN expires INTEGER NOT NULL DEFAULT 0;",
     /* What tenants use: bytes of the derived resources that they own, and time of workers. */
     "ALTER TABLE owner ADD COLUMN derived INTEGER NOT NULL DEFAULT 0;"

@@ -28,7 +28,7 @@ static int run_for(database *db, const char *sql, const char *job, int64_t now) 
   return database_run(db, st);
 }
 
-/* A job's first webhook makes the secret of its tenant. */
+/* The first webhook of a job creates its tenant's secret if there is none. */
 static int ensure_secret(database *db, const char *job) {
   char tenant[64] = "";
   sql_statement *st = database_statement(db, "SELECT owner FROM job WHERE id=?1");
@@ -118,7 +118,7 @@ typedef struct subscribe_arg {
   const job_webhook *hook;
 } subscribe_arg;
 
-/* The state and the last event of a job that has ended; *json NULL: it has not. */
+/* Reads the state and the last event of a job. *json NULL: it has not ended. */
 static int ended_as(database *db, const char *job, api_job_state *state, char **json) {
   sql_statement *st = database_statement(db,
                                          "SELECT j.state, e.json FROM job j JOIN event e ON e.job=j.id"
@@ -254,7 +254,7 @@ typedef struct record_arg {
 } record_arg;
 
 static int record_one(database *db, const delivery_row *row, int64_t now) {
-  /* A delivery that was removed or retried by hand in the meantime keeps what that has set. */
+  /* If a delivery was removed or retried by hand in the meantime, it keeps what that has set. */
   sql_statement *st = database_statement(db,
                                          "UPDATE delivery SET state=?2, status=?3, error=?4, next=?5, ended=?6,"
                                          " attempts=attempts+1, tried=tried+1 WHERE seq=?1 AND state=0");

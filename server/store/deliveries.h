@@ -38,7 +38,7 @@ typedef struct job_webhook {
 } job_webhook;
 
 /* These two run inside a transaction of the writer. */
-/* The webhook belongs to the job from now on, if the job does not have it. SQL_CONSTRAINT: it has JOB_WEBHOOKS. */
+/* Adds the webhook to the job, unless the job has it. SQL_CONSTRAINT: the job has JOB_WEBHOOKS others. */
 int delivery_subscribe(database *db, const char *job, const job_webhook *hook);
 /* The job has ended: adds the deliveries. json: the job. */
 int delivery_announce(database *db, const char *job, api_job_state state, const char *json, int64_t now);
@@ -47,15 +47,15 @@ int delivery_announce(database *db, const char *job, api_job_state state, const 
  * has JOB_WEBHOOKS. */
 store_result catalogue_job_subscribe(catalogue *cat, const char *job, const job_webhook *hook);
 
-/* The next delivery of each receiver that is due, at most `share` receivers of a tenant; those of all tenants take
- * turns. For the deliverer. */
+/* For the deliverer: lists the next delivery of each receiver that is due. It takes at most `share` receivers of a
+ * tenant, and tenants take turns. */
 int catalogue_deliveries_due(catalogue *cat, int64_t now, int share, int limit, delivery_row *out);
 /* When the next delivery is due, Unix time in ms; INT64_MAX: none is pending; −1: it cannot be read. */
 int64_t catalogue_deliveries_next(catalogue *cat);
 /* Records attempts: of each row seq, receiver, state, status, error and next. */
 store_result catalogue_deliveries_record(catalogue *cat, const delivery_row *rows, int count, int64_t now);
 
-/* Those of a job by number. */
+/* Lists the deliveries of a job by number. */
 int catalogue_deliveries_of(catalogue *cat, const char *job, int limit, delivery_row *out);
 /* Makes a delivery pending and due now. STORE_NOT_FOUND: there is no such delivery. */
 store_result catalogue_delivery_retry(catalogue *cat, const char *job, int number, int64_t now);

@@ -37,7 +37,7 @@ void catalogue_event(catalogue *cat, const char *job, int64_t number, const char
     snprintf(e->type, sizeof e->type, "%s", type);
     e->number = number;
     memcpy(e->json, json, size);
-    catalogue_write_later(cat, put_event, e);
+    catalogue_write_gathered(cat, put_event, e);
   }
 }
 

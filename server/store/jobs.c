@@ -224,7 +224,8 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
 
 /* Listed jobs of state ?1 (−1: any, −2: queued or running) with a sequence number below ?2. */
 #define LISTED " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND "
-/* Those whose id begins with ?5, through the index of ids; in SQLite, a "+" keeps it from using another index. */
+/* Only jobs whose id begins with ?5, through the index of ids. In SQLite, a "+" keeps the planner from using another
+ * index. */
 #define NAMED(seq) "id>=?5 AND id<?5 || 'g' AND " seq "<?2"
 
 int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,

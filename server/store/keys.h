@@ -13,7 +13,7 @@ typedef struct key_row {
   char secret[KEY_SECRET], old_secret[KEY_SECRET]; /* 64 hexadecimal digits; old_secret "": none */
   int64_t old_until;                               /* Unix time in seconds until which the old secret is valid */
   char origins[KEY_ORIGINS];                       /* comma-separated; "": all */
-  int64_t requests, cpu_seconds;                   /* limits a day; 0: none */
+  int64_t requests, cpu_seconds;                   /* limits for each day; 0: none */
   int64_t created;                                 /* Unix time in ms */
   int64_t day, used_requests, used_ms;             /* days since 1970, and what was used on that day */
 } key_row;

@@ -24,7 +24,7 @@ static const char *query_of(int shaped, int owned) {
                  : "SELECT " ALL_COLUMNS " FROM shape s JOIN resource r ON r.seq=s.seq WHERE" SHAPED;
   }
   return owned ? "SELECT " OWN_COLUMNS
-                 " FROM resource r CROSS JOIN owner o" /* in this order, which SQLite keeps */
+                 " FROM resource r CROSS JOIN owner o" /* CROSS JOIN makes SQLite keep this order */
                  " WHERE o.kind=r.kind AND o.id=r.id AND o.tenant=?4 AND" PREFIXED
                  " AND o.seq<?2 ORDER BY o.seq DESC LIMIT ?3"
                : "SELECT " ALL_COLUMNS " FROM resource r WHERE" PREFIXED " AND r.seq<?2 ORDER BY r.seq DESC LIMIT ?3";

@@ -8,7 +8,7 @@ typedef struct marks marks;
 
 marks *marks_create(void); /* NULL: out of memory */
 void marks_destroy(marks *m);
-void marks_add(marks *m, uint64_t hash); /* without memory the set stays as it was */
+void marks_add(marks *m, uint64_t hash); /* if out of memory, the set does not change */
 int marks_have(marks *m, uint64_t hash);
 
 #endif

@@ -29,13 +29,13 @@ static store_result unfit(int code) {
                                                                                                       : STORE_ERROR;
 }
 
-/* Opens the catalogue of a place as the only one that writes. *version: of its schema. */
+/* Opens the catalogue of a place for writing, which no other process does then. *version: of its schema. */
 static store_result open_database(const store_place *p, database *out, int *version) {
   char path[PATH_MAX];
   snprintf(path, sizeof path, "%s/catalogue.sqlite", p->data);
   int code = database_open(p->catalogue ? p->catalogue : path, 1, out);
   code = code == SQL_OK ? out->connection.driver->version(&out->connection, version) : code;
-  if (code != SQL_OK && !p->catalogue) { /* of a server, the driver has said why */
+  if (code != SQL_OK && !p->catalogue) { /* for a server, the driver has logged why */
     log_error("migrate: the catalogue %s cannot be opened: %s", path, sql_reason(code));
   }
   return unfit(code);
@@ -208,7 +208,7 @@ static store_result match_bucket(move *m) {
   return result;
 }
 
-/* Only a move that was killed in its last steps leaves the final owner beside the mark. */
+/* Only a move that was killed during its last steps leaves both the final owner and the mark. */
 static store_result match_both(const move *m) {
   return *m->owner && strcmp(m->owner, m->mark) == 0 && !m->marked
              ? refuse("the bucket of the target is that of the source, or of a whole copy")
@@ -224,7 +224,7 @@ static store_result make_spare(move *m) {
   return STORE_ERROR;
 }
 
-/* The first writes: from here on, the target is this move's. */
+/* The first writes. From here on, the target belongs to this move. */
 static store_result mark_target(move *m) {
   char unfinished[BUCKET_OWNER + 1];
   int version;

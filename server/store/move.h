@@ -1,5 +1,5 @@
-/* A whole deployment from one place to another: `orbmorphd migrate`. Each place is a data folder with a catalogue in
- * SQLite or PostgreSQL and objects in files or S3.
+/* Copies a whole deployment from one place to another: `orbmorphd migrate`. Each place is a data folder with a
+ * catalogue in SQLite or PostgreSQL and objects in files or S3.
  *
  * Until the end, no daemon starts on the target: its catalogue has the mark of store/move_mark.h, its bucket an owner
  * that begins with PLACE_MIGRATING. Both name the source. So a move that was killed can continue, and a target that
@@ -18,7 +18,7 @@ typedef struct move move;
 store_result move_open(const store_place *from, const store_place *to, move **out);
 void move_close(move *m);
 
-/* What happens on the way; all are called on the caller's thread. */
+/* Reports on the move. All functions run on the caller's thread. */
 typedef struct move_listener {
   void (*rows)(void *user, int64_t rows); /* copied so far */
   void (*objects)(void *user, const object_counts *counts);
@@ -28,8 +28,8 @@ typedef struct move_listener {
 
 /* Whether this continues an earlier move of the same deployment. */
 int move_goes_on(const move *m);
-/* Copies all, and removes the mark. STORE_CONFLICT: counts->wrong objects of the source are damaged or missing; all
- * others are copied, and the mark stays. */
+/* Copies everything and then removes the mark. STORE_CONFLICT: counts->wrong objects of the source are damaged or
+ * missing; the move copies all others, and the mark stays. */
 store_result move_run(move *m, const move_listener *listener, object_counts *counts);
 
 #endif

@@ -19,10 +19,10 @@ enum {
   BATCH = 64,         /* rows; each has at most RESOURCE_OBJECTS objects */
   THREADS = 8,        /* S3 answers one request in some 20 ms, and many at once */
   BLOCK = 1 << 18,    /* bytes read at a time */
-  AWAY_SECONDS = 300, /* for which S3 may be unreachable before the move gives up */
+  AWAY_SECONDS = 300, /* how long S3 may be unreachable before the move gives up */
 };
 
-/* An object of a batch, and what became of it. */
+/* An object of a batch, and the result of moving it. */
 typedef struct item {
   const resource *row;
   named_object object;
@@ -40,7 +40,7 @@ typedef struct batch {
   int next, stopped; /* __atomic */
 } batch;
 
-/* The hash of an object, by which a bucket's is known without being read. */
+/* The hash of an object. A bucket gives it without sending the object. */
 static store_result hash_of(const depot *d, object_kind kind, const char *id, char sha[65]) {
   char name[OBJECT_NAME];
   int fd;
@@ -57,7 +57,7 @@ static store_result hash_of(const depot *d, object_kind kind, const char *id, ch
   return result;
 }
 
-/* A file that has no name. */
+/* Makes a temporary file that has no name. */
 static int open_spare(const char *folder) {
   char path[PATH_MAX];
   snprintf(path, sizeof path, "%s/move-XXXXXX", folder);
@@ -297,7 +297,7 @@ static store_result count_batch(const batch *b, object_counts *counts) {
   return result;
 }
 
-/* Removes what no row names: an earlier run sent it, and the source has deleted it since. */
+/* Removes objects that no row names. An earlier run sent them, and the source has deleted them since. */
 typedef struct sweep {
   const object_move *m;
   object_counts *counts;

@@ -1,7 +1,7 @@
-/* All objects that a catalogue names, from one place to another: each is a folder of files or a bucket.
+/* Copies all objects that a catalogue names from one place to another. Each place is a folder of files or a bucket.
  *
  * Each object is compared with the hash in its row before it is written. One that is there with the right hash is not
- * sent again. Nothing of the source is changed, not even what is damaged. */
+ * sent again. Nothing in the source changes, not even damaged objects. */
 #ifndef ORB_STORE_MOVE_OBJECTS_H
 #define ORB_STORE_MOVE_OBJECTS_H
 
@@ -25,7 +25,7 @@ typedef struct object_counts {
 
 typedef struct object_move {
   depot from, to;
-  database *rows;    /* of the target, which is complete; its row of an alignment that is omitted is deleted */
+  database *rows;    /* of the target, which is complete; the move deletes the row of an alignment that it leaves out */
   const char *spare; /* a folder for temporary files */
   int again;         /* an earlier run may have sent some */
   void (*tell)(void *user, const object_counts *counts);

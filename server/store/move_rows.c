@@ -15,7 +15,7 @@ typedef struct table {
   const char *name, *keys[3];
   const char *skip[3]; /* columns that triggers fill */
   const char *conflict;
-  int numbered; /* seq is chosen by the database for rows to come */
+  int numbered; /* the database numbers new rows itself */
 } table;
 /* A job that was running when its process died waits again, as after a start. */
 static const struct {
@@ -39,9 +39,9 @@ static const table tables[] = {
     {"need", {"job", "key"}, {0}, "", 0}, /* of nodes that share a catalogue in PostgreSQL */
 };
 enum { TABLES = sizeof tables / sizeof tables[0] };
-/* Filled by triggers, copied apart, or of one database alone. */
+/* Tables that triggers fill, that are copied separately, or that only one database has. */
 static const char *const others[] = {"total", "shape", "secret", "catalogue", "migrating", "sqlite_sequence", NULL};
-/* Of a target in PostgreSQL: filled by triggers, or by nodes that run. */
+/* Tables of a target in PostgreSQL that triggers or running nodes fill. */
 static const char *const cleared[] = {"shape", "turn", "node", NULL};
 
 typedef struct column {
@@ -289,7 +289,7 @@ static store_result take_page(copy *c, database *db, sql_statement *page, sql_st
   return code == SQL_DONE ? STORE_OK : failed(db, "rows cannot be read from", c->t->name, code);
 }
 
-/* Passes over all rows of the table in `db`, in pages. */
+/* Goes through all rows of the table in `db`, page by page. */
 static store_result each_page(copy *c, database *db, sql_statement *to, digest *sum) {
   store_result result = STORE_OK;
   key last = {{NULL, NULL}};
@@ -347,7 +347,7 @@ static store_result compare_table(copy *c) {
   return result;
 }
 
-/* Rows to come get numbers beyond those that were ever given: cursors and event ids of clients stay valid. */
+/* New rows get numbers beyond all that were ever used, so cursors and event ids of clients stay valid. */
 static store_result copy_number(copy *c) {
   char read[160], write[256];
   const char *name = c->t->name;
@@ -391,7 +391,7 @@ static int has_table(database *db, const char *name) {
   return has;
 }
 
-/* What an earlier run has copied may have changed since. */
+/* The source may have changed since an earlier run copied it. */
 static store_result empty(database *to) {
   api_text sql = {0};
   int truncates = to->connection.driver == &sql_postgresql;
@@ -415,7 +415,8 @@ static store_result empty(database *to) {
   return code == SQL_OK ? STORE_OK : STORE_ERROR;
 }
 
-/* The file of SQLite is ours alone: a table that is not in the lists above would be left behind. */
+/* A catalogue in SQLite has only tables of this program. A table that is missing in the lists above would be left
+ * behind. */
 static store_result check_tables(database *db) {
   sql_statement *st = db->connection.driver == &sql_postgresql
                           ? NULL
@@ -448,7 +449,7 @@ static store_result copy_secret(database *from, database *to) {
   if (!*hex) {
     return failed(from, "the secret cannot be read of", "the catalogue", SQL_CORRUPT);
   }
-  /* Of a statement that fails, the log gets the first 60 characters: not those of the secret. */
+  /* The log shows the first 60 characters of a statement that fails; the secret comes later. */
   snprintf(sql, sizeof sql, "UPDATE secret SET bytes=%50s%s%s%s", "", database_either(to, "X'", "decode('"), hex,
            database_either(to, "'", "', 'hex')"));
   int code = database_execute(to, sql);

@@ -16,7 +16,8 @@ enum { KEPT_PERCENT = 90 }; /* after deleting, so that not every new file walks 
 
 struct object_cache {
   pthread_mutex_t evicting;
-  uint64_t most, bytes; /* bytes: at most so many; what was replaced or deleted by others is found at the next walk */
+  uint64_t most,
+      bytes; /* an upper bound in bytes: the next walk finds out which files others have replaced or deleted */
   char folder[PATH_MAX];
 };
 
@@ -87,7 +88,7 @@ static void evict(object_cache *cache) {
   if (top < 0) {
     return;
   }
-  __atomic_store_n(&cache->bytes, 0, __ATOMIC_RELAXED); /* what comes during the walk may count twice */
+  __atomic_store_n(&cache->bytes, 0, __ATOMIC_RELAXED); /* a file that is added during the walk may count twice */
   walk(top, "", 0, &list);
   uint64_t left = list.bytes, deleted = 0;
   if (left > cache->most) {
@@ -125,7 +126,7 @@ void object_cache_close(object_cache *cache) {
 
 void object_cache_used(int fd) {
   const struct timespec times[2] = {{.tv_nsec = UTIME_NOW}, {.tv_nsec = UTIME_OMIT}};
-  futimens(fd, times); /* by itself, a file system may not keep the time of reading */
+  futimens(fd, times); /* the file system may be mounted so that reading does not set the time */
 }
 
 void object_cache_grew(object_cache *cache, uint64_t bytes) {

@@ -43,13 +43,14 @@ store_result file_make_folder(const char *path) {
   return mkdir(path, 0700) == 0 || errno == EEXIST ? STORE_OK : file_failed("mkdir", path);
 }
 
-/* The folders of objects of one kind are made with their first object: 256 a kind would take most of a first start. */
+/* A folder of objects is made with its first object. Making all 256 of each kind would take most of a first start. */
 store_result object_file_make_folder(const char *root, object_kind kind, const char *id) {
   char path[PATH_MAX];
   snprintf(path, sizeof path, "%s/objects/%s/%.2s", root, folders[kind], id);
   store_result status = file_make_folder(path);
   *strrchr(path, '/') = 0;
-  return status == STORE_OK ? sync_folder(path) : status; /* another thread may have made it and not synced it yet */
+  return status == STORE_OK ? sync_folder(path)
+                            : status; /* another thread may have made it without having synced it yet */
 }
 
 store_result object_files_make_top(const char *root) {
@@ -196,7 +197,7 @@ store_result object_files_each(const char *root,
     for (int shard = 0; shard < 256; shard++) {
       char path[PATH_MAX];
       snprintf(path, sizeof path, "%s/objects/%s/%02x", root, folders[kind], (unsigned)shard);
-      DIR *dir = opendir(path); /* not there: no object in it so far */
+      DIR *dir = opendir(path); /* it does not exist before its first object */
       for (struct dirent *entry; dir && (entry = readdir(dir));) {
         struct stat info;
         if (entry->d_name[0] != '.' && fstatat(dirfd(dir), entry->d_name, &info, 0) == 0) {

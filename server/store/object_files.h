@@ -24,7 +24,7 @@ const char *object_folder(object_kind kind);
 
 /* Logs errno and what could not be done with a path; STORE_FULL if the disk is full, STORE_ERROR otherwise. */
 store_result file_failed(const char *what, const char *path);
-/* Makes a folder that may be there. */
+/* Makes a folder unless it exists. */
 store_result file_make_folder(const char *path);
 
 /* Makes the folders of the data folder: all of them, or only those of a store whose objects lie elsewhere. */
@@ -39,10 +39,10 @@ store_result object_file_make_folder(const char *root, object_kind kind, const c
 store_result object_file_publish(const char *root, object_kind kind, const char *id, int fd, const char *from);
 store_result object_file_read(const char *root, object_kind kind, const char *id, int *fd, uint64_t *size);
 store_result object_file_look(const char *root, object_kind kind, const char *id);
-/* An object that is not there counts as deleted. */
+/* STORE_OK also if there is no such object. */
 store_result object_file_delete(const char *root, object_kind kind, const char *id);
 /* Moves the file that was read through fd to the path `aside`, if it still has the name: it may have been replaced, or
- * moved by another thread, since it was read. STORE_NOT_FOUND: it is gone; *moved: by this call. */
+ * moved by another thread, since it was read. STORE_NOT_FOUND: no file has the name now. *moved: this call moved it. */
 store_result object_file_quarantine(const char *root, object_kind kind, const char *id, int fd, const char *aside,
                                     int *moved);
 store_result object_file_set_aside(const char *root, object_kind kind, const char *id, const char *aside);

@@ -11,8 +11,8 @@
 struct object_lock {
   pthread_mutex_t lock;
   database db;
-  int sharing; /* threads; the first takes the lock of the database, the last gives it back */
-  int shared;  /* it was taken for them */
+  int sharing; /* how many threads share; the first takes the lock of the database, the last gives it back */
+  int shared;  /* the database gave the lock to them */
   int64_t number;
   char name[33]; /* of its announcements */
   int announced;
@@ -63,8 +63,8 @@ static int holds_any(object_lock *l) {
   return holds;
 }
 
-/* Waits for what nodes announced that have lost the lock since. An announcement stands through its last millisecond.
- * 0: the database is unreachable. */
+/* Waits for the deletions that nodes announced before they lost the lock. An announcement stands through its last
+ * millisecond. 0: the database is unreachable. */
 static int wait_for_deletions(object_lock *l) {
   enum { LOOK_MS = 500 };
   for (int64_t left = 1; left > 0;) {
@@ -84,7 +84,8 @@ static int wait_for_deletions(object_lock *l) {
   return 1;
 }
 
-/* Every sharing that begins has another number, also one that did not get the lock: nobody holds that number. */
+/* Each time that sharing begins, it gets a new number, also if it does not get the lock: then nobody holds the number.
+ */
 static int begin_sharing(object_lock *l) {
   char sql[192];
   uint64_t random;
@@ -139,7 +140,8 @@ int object_lock_check(database *db, int64_t number) {
   return code;
 }
 
-/* The second lock is that of transactions (catalogue.c): one that looked before this lock was free ends first. */
+/* The second lock is that of transactions (catalogue.c): a transaction that checked its lock before this one was free
+ * ends first. */
 int object_lock_exclude(object_lock *l) {
   char sql[192];
   snprintf(sql, sizeof sql,
@@ -164,7 +166,8 @@ static int change(object_lock *l, const char *sql) {
   return done;
 }
 
-/* The look comes after the commit: a lock that is held now was held then, so whoever takes it later finds the row. */
+/* The check comes after the commit. A lock that is held now was held then, so any node that takes it later finds the
+ * row. */
 int object_lock_announce(object_lock *l) {
   char sql[384];
   snprintf(sql, sizeof sql,

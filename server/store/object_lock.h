@@ -2,11 +2,12 @@
  * Within the node, the lock of objects.c comes first.
  *
  * The database drops the lock with its connection, and others may then delete what was published meanwhile. So a node
- * that shares the lock also holds a number: a second lock of the same connection, which nobody else takes. A
+ * that shares the lock also holds a number: a second lock of the same connection, which no other connection takes. A
  * transaction that names objects commits only while that number is held (object_lock_check()). A node that excludes the
- * others waits for the running transaction, because that may have looked before the lock was lost.
+ * others waits for the running transaction, because that transaction may have checked its lock before the lock was
+ * lost.
  *
- * A node that deletes may lose the lock, too, between its last look and the moment at which S3 carries out its request.
+ * A node that deletes may also lose the lock between its last check and the moment at which S3 carries out its request.
  * So it announces each deletion in the catalogue for OBJECT_LOCK_DELETES_MS, by the database's clock, and signs the
  * request before, so that S3 refuses it long before that time is over (bucket_delete()). A node that shares the lock
  * while an announcement stands waits until it is withdrawn or over. */
@@ -19,8 +20,8 @@ typedef struct object_lock object_lock;
 
 object_lock *object_lock_open(const char *url); /* NULL: it cannot be opened */
 void object_lock_close(object_lock *l);         /* NULL: nothing */
-/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is unreachable; to
- * be given back nevertheless. */
+/* Waits; any number of threads of any number of nodes may share. 0: not taken, because the database is unreachable; the
+ * caller gives it back all the same. */
 int object_lock_share(object_lock *l);
 void object_lock_unshare(object_lock *l);
 /* The number that this thread's sharing began with; 0: this thread shares no lock. */

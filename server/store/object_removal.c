@@ -28,8 +28,8 @@ static void end_deleting(const objects *store) {
   }
 }
 
-/* Before a request that deletes from the bucket, which is signed as of *at: others are excluded still, and S3 refuses
- * the request long before they go on without this node. */
+/* Call it before a request that deletes from the bucket, which is signed as of *at. It ensures that others are still
+ * excluded, and that S3 refuses the request long before they go on without this node. */
 static int announce(objects *store, int64_t *at) {
   *at = store->nodes ? vault_clock(store->vault) : 0;
   return store->excluded && (!store->nodes || object_lock_announce(store->nodes));
@@ -63,7 +63,7 @@ store_result objects_delete(objects *store, object_kind kind, const char *id) {
   }
   if (!deletes || result == STORE_AWAY || result == STORE_CONFLICT) {
     result = STORE_OK;
-    held_object *one = calloc(1, sizeof *one); /* without memory the file stays until --gc */
+    held_object *one = calloc(1, sizeof *one); /* if out of memory, the file stays until --gc */
     if (one) {
       *one = (held_object){.next = store->held, .kind = kind};
       snprintf(one->id, sizeof one->id, "%s", id);
@@ -147,7 +147,7 @@ void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind 
 store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd) {
   char aside[PATH_MAX], fields[160];
   if (store->remote.publish) {
-    return STORE_NOT_FOUND; /* the daemon does it */
+    return STORE_NOT_FOUND; /* the daemon quarantines it */
   }
   snprintf(aside, sizeof aside, "%s/quarantine", store->root);
   store_result result = file_make_folder(aside);
@@ -165,7 +165,7 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
     objects_let_go(store);
     moved = result == STORE_NOT_FOUND;
   } else if (result == STORE_OK) {
-    (void)objects_exclude(store); /* files: there are no other nodes */
+    (void)objects_exclude(store); /* the objects are files, so there are no other nodes */
     result = object_file_quarantine(store->root, kind, id, fd, aside, &moved);
     objects_let_go(store);
   }

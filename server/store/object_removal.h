@@ -9,8 +9,8 @@
 
 #include "store/objects.h"
 
-/* Deletes an object that no row names; called while others are excluded. While a backup runs, S3 is unreachable, or
- * others are excluded no more, it stays until objects_delete_held(). */
+/* Deletes an object that no row names; called while others are excluded. The object stays until objects_delete_held()
+ * if a backup runs, S3 is unreachable, or the exclusion was lost. */
 store_result objects_delete(objects *store, object_kind kind, const char *id);
 /* Deletes what objects_delete() left, once no backup runs, and heals what reading from S3 found damaged. is_named:
  * whether a row names the object again; called while other threads are excluded. After a restart of the process the
@@ -18,7 +18,7 @@ store_result objects_delete(objects *store, object_kind kind, const char *id);
 void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user);
 
 int objects_backup_runs(objects *store);
-/* Keeps backups waiting until objects_close(), so that nothing that this process deletes is held. 0: a backup runs. */
+/* Keeps backups waiting until objects_close(), so that this process deletes at once. 0: a backup runs. */
 int objects_hold_backups(objects *store);
 
 /* Moves a wrong object, which was read through fd, out of the store. STORE_NOT_FOUND: done; STORE_OK: it has been

@@ -47,7 +47,8 @@ void objects_path(const objects *store, object_kind kind, const char *id, char o
   object_file_path(store->root, kind, id, out);
 }
 
-/* A store without files of its own so far; data NULL: it will have none. NULL: out of memory, or the path is too long.
+/* Makes a store that has no files yet. data NULL: it never has any. Returns NULL if out of memory, or if the path is
+ * too long.
  */
 static objects *create(const char *data) {
   objects *store = calloc(1, sizeof *store);
@@ -168,7 +169,7 @@ void objects_let_go(objects *store) {
   } else if (store->nodes && store->excluded) {
     object_lock_let_go(store->nodes);
   }
-  if (store->excludes) { /* only of a thread that has the lock alone; others must not write it */
+  if (store->excludes) { /* only a thread that holds the lock alone may write it */
     store->excludes = 0;
     store->excluded = 0;
   }
@@ -328,7 +329,7 @@ store_result objects_load(const objects *store, object_kind kind, const char *id
   return STORE_OK;
 }
 
-/* A copy of an object in S3 that was fetched again has another hash: the mark is one of the copy. */
+/* The mark refers to a copy: a copy that is fetched from S3 again has another one. */
 static uint64_t hash_of(const objects *store, object_kind kind, const char *id) {
   char text[104];
   int n = snprintf(text, sizeof text, "%d %.80s", (int)kind, id);
@@ -355,7 +356,7 @@ int objects_is_read_only(const objects *store) {
 
 uint64_t objects_free_bytes(const objects *store) {
   if (store->remote.publish) {
-    return UINT64_MAX; /* the daemon looks */
+    return UINT64_MAX; /* the daemon checks */
   }
   struct statvfs info;
   return statvfs(store->root, &info) == 0 ? (uint64_t)info.f_bavail * info.f_frsize : UINT64_MAX;

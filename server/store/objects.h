@@ -6,8 +6,8 @@
  * Publishing the same id twice is allowed, because equal ids have equal bytes.
  *
  * In a bucket, an object has its final name from the start, and S3 shows it completely or not at all. The folder
- * `cache` of the data folder then has verified copies of the objects that were used last, so a descriptor is always one
- * of a file.
+ * `cache` of the data folder then has verified copies of the objects that were used last, so a descriptor always refers
+ * to a file.
  */
 #ifndef ORB_STORE_OBJECTS_H
 #define ORB_STORE_OBJECTS_H
@@ -27,7 +27,7 @@ typedef struct objects objects;
 store_result objects_open(const char *data, objects **out);
 /* The same for objects in a bucket, which belongs to the store from now on. most: bytes of the folder `cache`. */
 store_result objects_open_bucket(const char *data, object_bucket *b, uint64_t most, objects **out);
-/* For reading objects only; changes nothing. */
+/* Opens the store for reading only, and changes nothing. */
 store_result objects_open_read_only(const char *data, objects **out);
 
 /* A store for a process that has no files. */
@@ -55,12 +55,12 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
  * then its objects calls objects_exclude() first, which waits for all holders. The same thread calls objects_let_go()
  * afterwards. Among nodes, the hold may be lost with a connection: then the commit of the row fails with STORE_LOST. */
 void objects_hold(objects *store);
-/* After STORE_LOST: holds anew. What was published before may have been deleted: objects_look() tells. */
+/* After STORE_LOST: takes the hold again. Objects that were published before may be gone; objects_look() tells. */
 void objects_hold_again(objects *store);
 /* 0: nodes that share the bucket could not be excluded; nothing may be deleted. */
 int objects_exclude(objects *store);
 void objects_let_go(objects *store);
-/* The bucket is shared with other nodes; the store closes the lock. */
+/* Tells the store that other nodes share its bucket through this lock. The store closes the lock. */
 struct object_lock;
 void objects_share(objects *store, struct object_lock *lock);
 
@@ -70,9 +70,9 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
 store_result objects_load(const objects *store, object_kind kind, const char *id, unsigned char **bytes, size_t *size);
 /* Whether an object is there, without reading it. */
 store_result objects_look(const objects *store, object_kind kind, const char *id);
-/* Whether reading an object asks no other machine now. */
+/* Whether the object can be read now without asking another machine. */
 int objects_is_near(const objects *store, object_kind kind, const char *id);
-/* Whether objects are in a bucket, and whether that does not answer. */
+/* Whether the objects are in a bucket, and whether the bucket fails to answer. */
 int objects_are_remote(const objects *store);
 int objects_are_away(const objects *store);
 /* A URL from which anyone may read an object for so many seconds; more: see s3_presign(). 0: there is none. */
@@ -85,7 +85,7 @@ void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]);
 int objects_read_name(const char *name, object_kind *kind, const char **id);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
-/* Makes the folder of that file, if it is not there. */
+/* Makes the folder of that file unless it exists. */
 store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
 /* Opens the lock file of backups. A backup holds it exclusively (flock()), so the kernel releases it with the process;

@@ -9,7 +9,7 @@
 #include "store/result.h"
 
 typedef struct objects_remote {
-  /* The descriptor stays the caller's. */
+  /* The caller keeps the descriptor. */
   store_result (*publish)(void *user, object_kind kind, const char *id, int fd);
   store_result (*read)(void *user, object_kind kind, const char *id, int *fd, uint64_t *size);
   void *user;

@@ -40,7 +40,7 @@ static int exists(database *db, const char *sql, int kind, const char *id, const
   return found == SQL_ROW;
 }
 
-/* For a result that existed before, this owner's description has the time of its own job. */
+/* If the result existed before, this owner's description has the time of the owner's job. */
 int owner_of_job(database *db, const char *job, int64_t now) {
   sql_statement *st = database_statement(
       db,

@@ -3,8 +3,8 @@
  * where no token was needed. Every row has an owner: rows older than ownership that no job names belong to "". Only old
  * alignments have none. The tenant whose job made an alignment owns it, so that its bytes count; no caller sees it.
  *
- * owner.bytes are those of meshes and landmarks, owner.derived those of all that jobs make; triggers keep their sums in
- * the rows of tenants.
+ * owner.bytes counts meshes and landmarks, owner.derived counts everything that jobs make. Triggers keep the sums of
+ * both in the rows of tenants.
  *
  * The first owner sees the resource's own description. Another owner gets a copy where the original would reveal
  * something about the first owner: the name it chose, and the time.
@@ -31,7 +31,7 @@ store_result catalogue_put_for(catalogue *cat, const resource *r, const char *te
 store_result catalogue_put_alignment(catalogue *cat, const resource *row, const char *tenant);
 /* The row with the description that this owner sees; STORE_NOT_FOUND if the tenant does not own it. */
 store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id, const char *tenant, resource *out);
-/* Like catalogue_list(), only what the tenant owns. */
+/* Like catalogue_list(), but lists only rows that the tenant owns. */
 int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit, resource *out);
 /* Removes an owner. *gone: it was the last one and the row is deleted. STORE_NOT_FOUND: the tenant did not own it. */
 store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id, const char *tenant, int *gone);

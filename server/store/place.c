@@ -160,7 +160,7 @@ int place_has_catalogue(const char *data) {
   return access(path, F_OK) == 0;
 }
 
-/* What can be said before the catalogue is opened, which may create it. here: the mark of the data folder. */
+/* Checks what can be checked before the catalogue is opened, which may create it. here: the mark of the data folder. */
 static store_result match_bucket(const store_place *p, const char *here, const char *owner) {
   if (strncmp(owner, PLACE_MIGRATING, strlen(PLACE_MIGRATING)) == 0) {
     log_error("orbmorphd migrate has filled the bucket of --objects in part: run it again until it ends");
@@ -182,7 +182,7 @@ static store_result match_bucket(const store_place *p, const char *here, const c
   return STORE_OK;
 }
 
-/* Ties the three together, when all are known. */
+/* Ties the three together, once all are known. */
 static store_result claim(const store_place *p, const char *path, const char *here, const char *owner, object_bucket *b,
                           catalogue *cat) {
   char mark[MARK];

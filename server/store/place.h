@@ -1,9 +1,9 @@
-/* What belongs together: a data folder, its catalogue and its objects.
+/* Ties together a data folder, its catalogue and its objects.
  *
- * Which catalogue belongs to a data folder: its own, in SQLite, or one in PostgreSQL. The folder remembers the latter
- * in the file catalogue.postgresql, so that its objects are never taken for those of another catalogue, which would not
- * name them. In the same way the file objects.s3 remembers that the objects are in a bucket of S3, and a bucket
- * remembers its catalogue. */
+ * The catalogue of a data folder is a file of the folder, in SQLite, or a database in PostgreSQL. The folder remembers
+ * the latter in the file catalogue.postgresql, so that no daemon takes its objects for those of another catalogue,
+ * which would not name them. In the same way the file objects.s3 remembers that the objects are in a bucket of S3, and
+ * a bucket remembers its catalogue. */
 #ifndef ORB_STORE_PLACE_H
 #define ORB_STORE_PLACE_H
 
@@ -16,7 +16,8 @@
  * what is wrong. shared: several nodes use the database, as they do where objects are in a bucket. */
 store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out);
 
-/* The tie between them: a hash of the catalogue's secret, in these two files of the data folder and in the bucket.
+/* The mark that ties them together: a hash of the catalogue's secret. It is in these two files of the data folder and
+ * in the bucket.
  */
 enum { PLACE_MARK = 2 * CATALOGUE_SECRET + 1 };
 extern const char place_catalogue[], place_objects[];
@@ -34,13 +35,13 @@ typedef struct store_place {
   const char *data;
   const char *catalogue; /* as above */
   bucket_options bucket; /* url NULL: objects are files of the data folder */
-  uint64_t cache;        /* bytes of copies of objects in a object_bucket */
+  uint64_t cache;        /* bytes of the folder that caches objects of the bucket */
 } store_place;
 
 /* What the options say; points into them. */
 store_place store_place_of(const config *options);
-/* Opens both. STORE_UNFIT: as above, also for objects that belong to another catalogue, a bucket that does not exist or
- * refuses. On failure the caller closes what was opened. */
+/* Opens both. STORE_UNFIT: as above; also if the objects belong to another catalogue, or the bucket does not exist or
+ * refuses access. On failure the caller closes what was opened. */
 store_result stores_open(const store_place *place, objects **store, catalogue **cat);
 
 #endif

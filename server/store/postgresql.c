@@ -137,7 +137,7 @@ static void reset(sql_statement *s) {
   drop_result(s->native);
 }
 
-/* A parameter that the SQL does not have is ignored. NULL is always that of a text. */
+/* Ignores a parameter that the SQL does not have. NULL always has the type text. */
 static void bind(statement *st, int parameter, const char *value, Oid type) {
   if (parameter <= st->parameters) {
     st->values[parameter - 1] = value;

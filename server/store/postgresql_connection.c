@@ -11,7 +11,7 @@
 /* Advisory locks; the second key is the schema. */
 enum { LOCK = SQL_LOCK, LOCK_OF_SCHEMA = SQL_LOCK + 1 };
 
-/* Tries to take the lock, which a daemon that died holds until the server notices: together 3 s. */
+/* Attempts to take the lock, 3 s in all. A daemon that died holds it until the server notices. */
 enum { LOCK_TRIES = 60 };
 #define LOCK_WAIT_NS 50000000
 
@@ -77,7 +77,7 @@ static int lock(pgsql_connection *c) {
   return code == SQL_OK && !locked ? refuse(c, SQL_BUSY, "another orbmorphd uses it") : code;
 }
 
-/* Whether this connection may write here, and is the only one. */
+/* Checks that this connection may write here, and that it is the only one. */
 static int begin_writer(pgsql_connection *c) {
   int64_t read_only = 0, schemas = 0, holder = 0;
   if (PQserverVersion(c->server) < 150000) {
@@ -102,7 +102,8 @@ static int begin_writer(pgsql_connection *c) {
   return code;
 }
 
-/* Sets up a new connection. pgbouncer passes on no options at the start of a connection, so these are statements. */
+/* Sets up a new connection. pgbouncer does not pass on options at the start of a connection, so they are set by
+ * statements. */
 static int begin(pgsql_connection *c) {
   int code = pgsql_run(c,
                        "SET client_min_messages=warning; SET statement_timeout='60s'; SET lock_timeout='20s';"
@@ -217,7 +218,7 @@ int pgsql_open(const char *where, int writer, pgsql_connection **out) {
   c->server = PQconnectdbParams(names, values, 1);
   int code = c->server && PQstatus(c->server) == CONNECTION_OK ? begin(c) : pgsql_failed(c, NULL);
   if (c->server && PQstatus(c->server) != CONNECTION_OK) {
-    /* A server that is there refuses this user, this password or this database. */
+    /* Whether the server answered and refused this user, this password or this database. */
     PGPing ping = PQpingParams(names, values, 1);
     code = ping == PQPING_OK || ping == PQPING_NO_ATTEMPT ? SQL_NOTADB : SQL_CANTOPEN;
   }

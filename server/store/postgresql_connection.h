@@ -1,4 +1,4 @@
-/* One connection to PostgreSQL: opened, locked for writing, and made again after it was lost. postgresql.c uses it.
+/* One connection to PostgreSQL: opens it, locks it for writing, and connects again after a loss. For postgresql.c.
  *
  * The connection that writes holds an advisory lock, one for each schema, so that one daemon alone works on a
  * catalogue, as the lock of the data folder ensures for SQLite. A lost connection loses the lock. The daemon gets the
@@ -35,7 +35,8 @@ int pgsql_failed(pgsql_connection *c, const PGresult *result);
 
 int pgsql_is_lost(const pgsql_connection *c);
 int pgsql_is_within(const pgsql_connection *c); /* a transaction */
-/* Connects again if the connection was lost. Not within a transaction, whose begin would be lost, too. */
+/* Connects again if the connection was lost. Do not call it within a transaction: the new connection is outside of it.
+ */
 int pgsql_restore(pgsql_connection *c);
 
 #endif

@@ -1,6 +1,6 @@
 /* The schema of the catalogue in PostgreSQL. Tables, columns, sums and triggers are those of SQLite (database.c),
- * so that the same SQL reads and writes them. Text that is compared has the collation "C": order and prefixes are those
- * of bytes. JSON is text, because its bytes are what callers get. */
+ * so that the same SQL reads and writes them. Text that is compared has the collation "C", so order and prefixes are
+ * those of bytes. JSON is stored as text, because callers get its bytes. */
 #include "store/postgresql_schema.h"
 
 /* Each entry brings the schema from version i to i + 1. */
@@ -142,7 +142,7 @@ const char *const postgresql_migrations[] = {
     "INSERT INTO turn(owner, ready, unfinished, listed, computing, cost) SELECT owner, count(*) FILTER (WHERE state=0),"
     " count(*), sum(listed), count(*) FILTER (WHERE kind<>2), coalesce(sum(cost) FILTER (WHERE kind<>2), 0)"
     " FROM job WHERE state<2 GROUP BY owner;"
-    /* One flight a key. */
+    /* At most one running job for each key. */
     "CREATE UNIQUE INDEX job_flight ON job(key) WHERE state=1;"
     "CREATE INDEX job_key ON job(key);"
     "CREATE INDEX job_ready ON job(owner, priority DESC, seq) WHERE state=0 AND waits=0;"
@@ -151,7 +151,7 @@ const char *const postgresql_migrations[] = {
     "CREATE FUNCTION job_changes() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"
     " IF NEW.state<>1 THEN NEW.node:=''; END IF; RETURN NEW; END $$;"
     "CREATE TRIGGER job_changes BEFORE UPDATE OF state ON job FOR EACH ROW EXECUTE FUNCTION job_changes();"
-    /* An owner whose first unfinished job comes starts level with the least served of the others. */
+    /* An owner that gets its first unfinished job starts level with the least served of the others. */
     "CREATE FUNCTION job_counted() RETURNS TRIGGER LANGUAGE plpgsql AS $$ DECLARE"
     " who TEXT:=coalesce(NEW.owner, OLD.owner); sign BIGINT; r BIGINT:=0; u BIGINT:=0; l BIGINT:=0; n BIGINT:=0;"
     " c BIGINT:=0; one RECORD; BEGIN"
@@ -221,13 +221,13 @@ const char *const postgresql_migrations[] = {
      */
     "CREATE TABLE deletion(node ident PRIMARY KEY, until BIGINT NOT NULL);"
     "CREATE INDEX job_small ON job(owner, cost) WHERE state=0 AND waits=0 AND kind<>2;",
-    /* Nodes hear how much a tenant with a quota stores. No twin in SQLite, which one daemon uses. */
+    /* Notifies nodes how much a tenant with a quota stores. SQLite has no such trigger, because one daemon uses it. */
     "CREATE FUNCTION bytes_told() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"
     " IF (TG_OP='INSERT' OR NEW.bytes<>OLD.bytes)"
     "  AND EXISTS(SELECT 1 FROM token WHERE tenant=NEW.name AND quota_bytes>0)"
     "  THEN PERFORM tell(TG_TABLE_SCHEMA, 'u' || NEW.name); END IF; RETURN NULL; END $$;"
     "CREATE TRIGGER bytes_told AFTER INSERT OR UPDATE OF bytes ON tenant FOR EACH ROW EXECUTE FUNCTION bytes_told();",
-    /* Turns go by the time that workers had jobs. It replaces the estimate that a claim has charged (ESTIMATE of
+    /* Turns depend on the time that workers had jobs. It replaces the estimate that a claim has charged (ESTIMATE of
      * shared.c) when a job leaves its worker, in whichever way. An owner whose first unfinished job comes starts level
      * with the least served of the others, the time of their running jobs included. */
     "CREATE FUNCTION job_used() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"

@@ -1,12 +1,12 @@
-/* What becomes of jobs that ran when their process or node ended. */
+/* Queues or fails the jobs that ran when their process or node ended. */
 #include <stdlib.h>
 
 #include "store/deliveries.h"
 #include "store/rows.h"
 
 typedef struct recovery {
-  const char *node;    /* whose last life ended; "": none */
-  int others;          /* also the jobs of other nodes whose lease has passed */
+  const char *node;    /* the node's name before its restart; "": none */
+  int others;          /* also the jobs of other nodes whose lease has expired */
   int most_crashes;    /* 0: the jobs had processes of their own, and their ends were counted */
   const char *problem; /* of a job that crashed so often */
   int64_t now;
@@ -101,8 +101,9 @@ static int recover(database *db, void *arg) {
   return code == SQL_OK ? give_up_all(db, c) : code;
 }
 
-/* Queues the jobs of this node's last life: they did not cause its end, as they have processes of their own. With
- * `others`, also queues the jobs of nodes that are gone, as suspects: they may have been the cause, except downloads.
+/* Queues the jobs that this node ran before its restart. They did not cause its end, because they have processes of
+ * their own. With `others`, also queues the jobs of nodes that are gone, as suspects: they may have been the cause,
+ * except downloads.
  */
 static int recover_lost(database *db, void *arg) {
   const recovery *c = arg;

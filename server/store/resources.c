@@ -163,7 +163,7 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
     key->kind = (int)kind;
     memcpy(key->id, id, sizeof key->id);
     key->now = (int64_t)time(NULL) * 1000;
-    catalogue_write_later(cat, touch_row, key);
+    catalogue_write_gathered(cat, touch_row, key);
   }
 }
 

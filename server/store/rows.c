@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 static void complain(const database *db) {
-  if (!sql_postgresql_is_away()) { /* the log has that */
+  if (!sql_postgresql_is_away()) { /* which has been logged */
     log_error("catalogue: rows cannot be read: %s", db->connection.driver->message(&db->connection));
   }
 }

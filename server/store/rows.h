@@ -22,13 +22,13 @@ typedef struct row_kind {
   void (*release)(void *row);
   size_t size;
 } row_kind;
-/* A description for a list: that of landmarks, which ends with them, without them. */
+/* The description that a list shows. A description of landmarks ends with the landmarks, which a list omits. */
 #define ROW_SUMMARY(kind, json) \
   "iif(" kind "=3, substr(" json ", 1, instr(" json ", ',\"landmarks\":')-1)||'}', " json ")"
-/* Of a job: these columns. */
+/* The columns of a job. */
 #define JOB_COLUMNS JOB_COLUMNS_WITH("state")
-/* As callers see it, where several nodes share the jobs: one that waits for jobs runs when they do, and one that a node
- * has claimed, only to see which jobs it must wait for, does not run yet. */
+/* The state that callers see where several nodes share the jobs. A job that waits for others is running once one of
+ * them runs. A job that a node has claimed only to find out what it must wait for is still queued. */
 #define JOB_STATE_SHOWN \
   "CASE WHEN state=0 AND waits>0 AND started>0 THEN 1 WHEN state=1 AND started=0 THEN 0 ELSE state END"
 #define JOB_COLUMNS_SHOWN JOB_COLUMNS_WITH(JOB_STATE_SHOWN)

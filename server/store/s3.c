@@ -21,6 +21,7 @@ enum {
   PAUSE_MS = 100,      /* mean of the first pause between tries; each further one is twice as long */
   IDLE_MOST = 16,      /* connections kept open */
   TEXT_MOST = 4 << 20, /* a list of 1,000 names takes 0.4 MB */
+  SKEW_SECONDS = 60,   /* S3 accepts signatures that differ from its time by up to 15 minutes */
 };
 
 struct s3 {
@@ -39,7 +40,8 @@ typedef struct transfer {
   uint64_t sent, taken;
   size_t room; /* of out->text */
   int no_space;
-  char date[64]; /* of the answer */
+  char date[64];     /* of the answer */
+  int64_t signed_at; /* of s3_clock() */
 } transfer;
 
 s3 *s3_open(const s3_options *options) {
@@ -233,8 +235,8 @@ static int append(struct curl_slist **list, const char *line) {
   return more != NULL;
 }
 
-/* The headers, with the signature over all that S3 looks at. */
-static int sign(s3 *store, const s3_request *r, const char *path, struct curl_slist **out) {
+/* The headers, with the signature over all that S3 looks at. now: when the request is signed. */
+static int sign(s3 *store, const s3_request *r, const char *path, int64_t now, struct curl_slist **out) {
   if (r->signed_at) { /* the URL is signed */
     return append(out, "expect:");
   }
@@ -249,7 +251,7 @@ static int sign(s3 *store, const s3_request *r, const char *path, struct curl_sl
   if (!headers) {
     return 0;
   }
-  s3_date((long long)time(NULL), date);
+  s3_date((long long)now, date);
   snprintf(names, sizeof names, "host;x-amz-content-sha256;x-amz-date%s%s", r->meta ? ";x-amz-meta-sha256" : "",
            *token ? ";x-amz-security-token" : "");
   int n = snprintf(headers, room, "host:%s\nx-amz-content-sha256:%s\nx-amz-date:%s\n", o->place.host, sha, date);
@@ -326,7 +328,8 @@ static void perform(s3 *store, transfer *t, const char *path, const char *url) {
   curl_off_t length = -1, modified = -1;
   s3_answer *out = t->out;
   t->curl = take_handle(store);
-  if (!t->curl || !sign(store, t->request, path, &headers) || !set_up(store, t, url, headers, error)) {
+  t->signed_at = s3_clock(store);
+  if (!t->curl || !sign(store, t->request, path, t->signed_at, &headers) || !set_up(store, t, url, headers, error)) {
     snprintf(out->why, sizeof out->why, "the server has no memory left");
   } else {
     CURLcode code = curl_easy_perform(t->curl);
@@ -401,10 +404,16 @@ void s3_send(s3 *store, const s3_request *request, s3_answer *out) {
     snprintf(out->why, sizeof out->why, "its URL is too long");
     return;
   }
-  for (int tried = 0;; tried++) {
+  for (int tried = 0, corrected = request->signed_at != 0;; tried++) {
     memset(out, 0, sizeof *out);
     transfer t = {.request = request, .out = out};
     perform(store, &t, path, url);
+    if (out->status == 403 && !corrected && llabs(s3_clock(store) - t.signed_at) > SKEW_SECONDS) {
+      corrected = 1; /* the answer has told S3's time: sign again with it */
+      free(out->text);
+      tried--;
+      continue;
+    }
     if (out->status >= 300 || (out->status > 0 && out->status < 200)) {
       explain(out);
     }
@@ -420,7 +429,7 @@ void s3_send(s3 *store, const s3_request *request, s3_answer *out) {
 int s3_link(s3 *store, const char *key, long seconds, const char *more, char *out, size_t size) {
   char path[1024];
   snprintf(path, sizeof path, "%s%s%s", store->options.place.base, store->options.place.prefix, key);
-  return link_to(store, "GET", path, (int64_t)time(NULL), seconds, more, out, size);
+  return link_to(store, "GET", path, s3_clock(store), seconds, more, out, size);
 }
 
 static size_t decode_entity(const char *text, char *out) {

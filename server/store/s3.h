@@ -50,7 +50,8 @@ void s3_close(s3 *store);
 /* Signs the requests from now on with these keys. */
 void s3_use_keys(s3 *store, const s3_keys *keys);
 /* Sends a request, and sends it again after 5xx, 429, a lost connection or half an answer. It pauses before each
- * further try: see s3_pause(). The caller frees out->text. */
+ * further try: see s3_pause(). Requests are signed with the time of s3_clock(). If S3 refuses one with 403 and its
+ * answer shows that this time was wrong, s3_send() signs and sends it again. The caller frees out->text. */
 void s3_send(s3 *store, const s3_request *request, s3_answer *out);
 /* What time it is for S3, a Unix time, counted on from the date of its last answer; before the first answer, the
  * time of this machine. After an answer it is never ahead of S3. It is behind by the time that passed until this

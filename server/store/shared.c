@@ -5,8 +5,8 @@
 #include "store/deliveries.h"
 #include "store/rows.h"
 
-/* Estimate of a job's time, charged until it is known: as queue/schedule.c does within a process. The trigger job_used
- * of postgresql_schema.c takes it back. */
+/* Estimate of a job's time, charged until the time is known, as queue/schedule.c does within a process. The trigger
+ * job_used of postgresql_schema.c replaces it. */
 #define ESTIMATE(job) "(10+" job ".cost/100)"
 
 /* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner. Owners with ready jobs, each
@@ -42,14 +42,14 @@
   " ORDER BY next.suspect DESC, next.priority/8 DESC, (coalesce(b.computing, 0)>=s.workers),"                         \
   "  t.service+coalesce(b.beyond, 0), next.seq LIMIT 1"
 #define ANY_COST "9223372036854775807"
-/* An owner without a job that is small enough costs one look. The second part of UNION ALL runs only if the first has
- * no row. */
+/* An owner without a job that is small enough costs one access to the index. The second part of UNION ALL runs only if
+ * the first has no row. */
 static const char pick_computing[] =
     PICK("(?3=" ANY_COST " OR EXISTS(SELECT 1 FROM job WHERE " READY("kind<>2") " AND cost<=?3))",
          FIRST("kind<>2") " UNION ALL " SMALLEST("kind<>2") " LIMIT 1");
 static const char pick_fetching[] = PICK("true", FIRST("kind=2"));
 
-/* Another claim of the same moment skips the row, where the lock of transactions did not keep it waiting. */
+/* A concurrent claim skips the row if the lock of transactions did not make it wait. */
 static const char take[] =
     "UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(), alone=suspect,"
     " started=CASE WHEN started=0 AND kind<>1 THEN clock_ms() ELSE started END" /* 1: catalogue_job_begin() */
@@ -419,7 +419,7 @@ int catalogue_needs_mesh(catalogue *cat, const char *mesh, const char *owner) {
     sql_bind_text(st, 1, mesh);
     sql_bind_text(st, 2, owner);
   }
-  return rows_integer(cat, db, st) != 0; /* if it cannot be read, it may be */
+  return rows_integer(cat, db, st) != 0; /* if the rows cannot be read, assume that one does */
 }
 
 char *catalogue_failure(catalogue *cat, const char *key, const char *owner, int64_t since) {

@@ -3,9 +3,9 @@
  *
  * Contract. A node claims the job that is first in the order of fairness over all nodes; the row then says that it
  * runs, with the node and the next attempt. A node has one lease, a time of the database's clock, which it renews
- * (notices.h) for all its jobs. When it has passed, any node queues its jobs again (catalogue_recover_lost()). A change
- * of a job needs its (id, attempt), so a node that lost its lease gets STORE_CONFLICT. The database notifies all nodes
- * of each change by triggers, in its transaction. */
+ * (notices.h) for all its jobs. When the lease has expired, any node queues its jobs again (catalogue_recover_lost()).
+ * A change of a job needs its (id, attempt), so a node that lost its lease gets STORE_CONFLICT. The database notifies
+ * all nodes of each change by triggers, in its transaction. */
 #ifndef ORB_STORE_SHARED_H
 #define ORB_STORE_SHARED_H
 
@@ -13,14 +13,14 @@
 
 enum { NODE_NAME = 33 };
 
-/* What a node would claim. */
+/* Which job a node can take. */
 typedef struct claim_wish {
   const char *node;
   int fetches;       /* a job that downloads; else one that computes */
   int fetches_most;  /* downloads of an owner at once */
   int64_t most_cost; /* triangles for which this node has memory, and room beside large jobs */
   int big;           /* also a job that needs all memory */
-  int alone;         /* also a suspect: nothing else runs here */
+  int alone;         /* also a suspect, because nothing else runs here */
   int guest;         /* only a job of an owner that runs nothing, while all workers of all nodes are busy */
 } claim_wish;
 typedef struct job_claim {
@@ -62,7 +62,7 @@ store_result catalogue_job_wait(catalogue *cat, const job_needs *needs);
 store_result catalogue_job_begin(catalogue *cat, const char *id, int attempt);
 /* Like catalogue_job_release(), and the job needs all memory of a node from now on. */
 store_result catalogue_job_release_big(catalogue *cat, const char *id, int attempt);
-/* Marks a job as to be cancelled, and notifies the node that runs it. */
+/* Asks for a job to be cancelled, and notifies the node that runs it. */
 store_result catalogue_job_cancel(catalogue *cat, const char *id);
 
 /* What other nodes did to jobs, for those that this node watches or runs. */
@@ -75,7 +75,7 @@ typedef struct job_mark {
 /* The marks of jobs whose ids are in a text, separated by commas. */
 int catalogue_job_marks(catalogue *cat, const char *ids, int limit, job_mark *out);
 
-/* Whether jobs run on nodes whose lease has passed. No lease passes while the database is unreachable, nor within one
+/* Whether jobs run on nodes whose lease has expired. No lease expires while the database is unreachable, nor within one
  * lease after it is back. */
 int catalogue_lost_jobs(catalogue *cat, int64_t lease_ms);
 

@@ -17,12 +17,13 @@ static int quick_check(database *db) {
   return fine;
 }
 
-/* The connection only reads: it neither writes the catalogue nor checkpoints its WAL, which is the daemon's to do. */
+/* The connection only reads. It neither writes the catalogue nor checkpoints its WAL; only the daemon does that. */
 static int vacuum_into(const char *from, const char *path) {
   database db;
   int code = database_open(from, 0, &db);
   if (code == SQL_OK) {
-    code = database_execute(&db, "PRAGMA query_only=OFF"); /* it would refuse VACUUM INTO; the file is read-only */
+    code = database_execute(
+        &db, "PRAGMA query_only=OFF"); /* query_only would refuse VACUUM INTO; the file is opened for reading */
     sql_statement *st = database_statement(&db, "VACUUM INTO ?1");
     if (code == SQL_OK && st) {
       sql_bind_text(st, 1, path);

@@ -114,7 +114,7 @@ store_result spheres_find(const objects *store, const char *id, int shape, uint6
   return result;
 }
 
-/* Hashes the first bytes of a file in parts, so that its size does not matter. */
+/* Hashes the first bytes of a file in parts, so that the memory does not depend on its size. */
 static int hash_first(int fd, uint64_t size, unsigned char hash[HASH_BYTES]) {
   enum { BLOCK = 1 << 18 };
   unsigned char *block = malloc(BLOCK);

@@ -1,4 +1,4 @@
-/* The file of aligned spheres: all spheres of a supermesh, one a shape, in one object.
+/* The file of aligned spheres: all spheres of a supermesh, one for each shape, in one object.
  *
  * Each is the PLY of orb_sphere_ply_write(): the shape's surface after alignment (vertices that the alignment added
  * have source −1) and its points on the common sphere. After the last PLY, little-endian:

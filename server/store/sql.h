@@ -10,7 +10,7 @@
 
 #include <stdint.h>
 
-/* What became of a call. All but the first three are errors. */
+/* The result of a call. All but the first three are errors. */
 enum sql_code {
   SQL_OK,
   SQL_ROW,  /* a step has a row */
@@ -28,7 +28,7 @@ enum sql_code {
   SQL_CORRUPT,
   SQL_NOTADB,
   SQL_SCHEMA,     /* of a newer program */
-  SQL_UNFINISHED, /* the half of another catalogue, see store/move_mark.h */
+  SQL_UNFINISHED, /* an incomplete copy of another catalogue, see store/move_mark.h */
   SQL_CODES
 };
 const char *sql_reason(int code); /* in words */
@@ -50,7 +50,7 @@ enum { SQL_READS, SQL_WRITES, SQL_SHARES };
 enum { SQL_LOCK = 0x6f726d, SQL_LOCK_WRITES = SQL_LOCK + 2, SQL_LOCK_HOUSE, SQL_LOCK_OBJECTS };
 
 typedef struct sql_driver {
-  /* writer: one of the above. The caller closes also what could not be opened. */
+  /* writer: one of the above. The caller closes the connection, also if it could not be opened. */
   int (*open)(const char *where, int writer, sql_connection *out);
   void (*close)(sql_connection *c);
   const char *(*message)(const sql_connection *c);    /* of the last error */
@@ -79,10 +79,10 @@ typedef struct sql_driver {
 extern const sql_driver sql_sqlite; /* where: the path of its file */
 /* where: a URL, postgresql://…. One connection that writes at a time: SQL_BUSY if another process has one. */
 extern const sql_driver sql_postgresql;
-/* Whether the server did not answer when it was last tried. The second notes that. */
+/* Whether the server failed to answer the last attempt to connect; the second function records that. */
 int sql_postgresql_is_away(void);
 void sql_postgresql_note(int is_away);
-/* When that was last so, or a connection was found to be lost, in ms of the monotonic clock; 0: never. */
+/* When the server last failed to answer, or a connection was found lost, in ms of the monotonic clock; 0: never. */
 int64_t sql_postgresql_failed_at(void);
 
 static inline void sql_bind_text(sql_statement *st, int parameter, const char *text) {

@@ -68,10 +68,11 @@ static store_result compare(const transfer *t, const objects *from, const char *
   return !t->object->sha[0] || strcmp(sha, t->object->sha) == 0 ? STORE_OK : STORE_CONFLICT;
 }
 
-/* 1: linked; 0: the file systems do not allow it, or it failed. A backup deletes a name that a killed one left. */
+/* 1: linked; 0: the file systems do not allow it, or it failed. Deletes a name that a killed backup has left. */
 static int link_to(const transfer *t, const objects *to) {
   char source[64], temp[PATH_MAX];
-  snprintf(source, sizeof source, "/proc/self/fd/%d", t->source); /* the file that was read, whatever has its name */
+  snprintf(source, sizeof source, "/proc/self/fd/%d",
+           t->source); /* the file that was read, even if another one has its name now */
   if (snprintf(temp, sizeof temp, "%s.new", t->path) >= (int)sizeof temp) {
     return 0;
   }

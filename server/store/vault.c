@@ -69,7 +69,7 @@ static void path_of(const vault *v, const char *name, char out[PATH_MAX]) {
   snprintf(out, PATH_MAX, "%s/cache/%s", v->root, name);
 }
 
-/* Moves a file to its place in the cache. What fails here costs another download only. */
+/* Moves a file to its place in the cache. A failure only costs another download. */
 static int keep(vault *v, const char *name, const char *from) {
   char path[PATH_MAX];
   struct stat info;
@@ -143,7 +143,7 @@ static int note_damaged(vault *v, const char *name) {
   return one != NULL;
 }
 
-/* Keeps wrong bytes and notes their name. The thread that takes the name deletes the object from the bucket: this
+/* Keeps wrong bytes and notes their name. The thread that takes the name deletes the object from the bucket. This
  * thread may be a publisher, which cannot exclude others. */
 static void set_damaged(vault *v, const char *name, const char *from) {
   char aside[PATH_MAX];

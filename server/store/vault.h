@@ -30,7 +30,7 @@ store_result vault_each(vault *v, void (*each)(void *user, const char *name, uin
 
 /* A number of the copy that is in the cache now; 0: there is none. Another copy has another number. */
 uint64_t vault_copy(const vault *v, const char *name);
-/* For a copy that was read through fd and is not what its row says: moves it aside. STORE_NOT_FOUND: the object in the
+/* Moves a copy aside that was read through fd and does not match its row. STORE_NOT_FOUND: the object in the
  * bucket was the same, and is deleted; STORE_OK: the bucket has another one. */
 store_result vault_quarantine(vault *v, const char *name, int fd, const char *aside, int64_t signed_at);
 /* Moves an object out of the bucket to a path, for --gc. STORE_CONFLICT: it is younger than VAULT_GRACE_S, so its row
@@ -38,7 +38,7 @@ store_result vault_quarantine(vault *v, const char *name, int fd, const char *as
 store_result vault_set_aside(vault *v, const char *name, const char *aside, int64_t signed_at);
 /* Takes the name of one object that vault_read() found damaged. 0: there is none. */
 int vault_take_damaged(vault *v, char name[VAULT_NAME]);
-/* Deletes it from the bucket if it is still damaged. STORE_NOT_FOUND: done; STORE_OK: it has been replaced. */
+/* Deletes that object from the bucket if it is still damaged. STORE_NOT_FOUND: done; STORE_OK: it has been replaced. */
 store_result vault_drop_damaged(vault *v, const char *name, int64_t signed_at);
 
 int vault_is_away(vault *v);

@@ -13,7 +13,7 @@ int verify_is_done(const objects *store, object_kind kind, const char *id) {
   return objects_is_marked(store, kind, id);
 }
 
-/* Hashes a file in parts, so that its size does not matter. */
+/* Hashes a file in parts, so that the memory does not depend on its size. */
 static int hash_file(int fd, char sha[API_ID_SIZE], const verify_pace *pace) {
   enum { BLOCK = 1 << 18 };
   unsigned char *block = malloc(BLOCK);

@@ -13,7 +13,7 @@ int verify_is_done(const objects *store, object_kind kind, const char *id);
  * whose file has its hash. Reads the object; the caller must not hold the store (objects_hold()). STORE_NOT_FOUND: it
  * is lost, or quarantined now. */
 store_result verify_once(objects *store, object_kind kind, const char *id, const char *sha);
-/* The same, also if it has been done. */
+/* The same, even if that has been done. */
 store_result verify_again(objects *store, object_kind kind, const char *id, const char *sha);
 
 /* wait: called after each part that was read, with its bytes; 0 stops. */

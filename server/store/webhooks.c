@@ -52,7 +52,7 @@ int webhook_ensure_secret(database *db, const char *tenant) {
   webhook_new_secret(row.secret);
   int code = add_row(db, &row);
   sodium_memzero(row.secret, sizeof row.secret);
-  return code == SQL_CONSTRAINT ? SQL_OK : code; /* it exists */
+  return code == SQL_CONSTRAINT ? SQL_OK : code; /* the row exists */
 }
 
 store_result catalogue_webhook_rotate(catalogue *cat, const char *name, const char *secret, int64_t old_until) {

@@ -75,7 +75,7 @@ static void show(void *user, const char *stage, double fraction) {
   c->shown = now;
   const struct iovec part = {&head, sizeof head};
   if (channel_send(c->channel, FRAME_PROGRESS, &part, 1, -1, NULL, NULL) != CHANNEL_OK) {
-    _exit(1); /* the daemon has let go of this process */
+    _exit(1); /* the daemon has given this process up */
   }
 }
 
@@ -152,7 +152,7 @@ static void take_input(confined *c, frame *f) {
 static void take_task(confined *c, frame *f) {
   channel_result got = channel_receive(c->channel, CHANNEL_MOST, f, NULL, NULL);
   if (got == CHANNEL_CLOSED) {
-    _exit(0); /* the daemon needs this process no more */
+    _exit(0); /* the daemon no longer needs this process */
   }
   if (got != CHANNEL_OK || f->type != FRAME_TASK || f->size < sizeof c->task) {
     _exit(1);
@@ -160,8 +160,8 @@ static void take_task(confined *c, frame *f) {
   memcpy(&c->task, f->bytes, sizeof c->task);
 }
 
-/* The heap of a process that checks several files stays: what is given back between two files is faulted in again page
- * by page. KEPT_BYTES: more than files of READER_BYTES take; larger blocks are mapped by core alone. */
+/* A process that checks several files keeps its heap: memory that it gave back between two files would be faulted in
+ * again page by page. KEPT_BYTES: more than a file of READER_BYTES needs. */
 _Noreturn static void run_checks(confined *c, frame *f) {
   if (c->task.again) {
     (void)mallopt(M_TRIM_THRESHOLD, KEPT_BYTES);

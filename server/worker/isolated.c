@@ -29,7 +29,7 @@ typedef struct collected {
   int64_t bytes;
 } collected;
 
-/* Adds a row and its object; what is not there stays out, and the process reports what it lacks. */
+/* Adds a row and its object. It leaves out what does not exist, and the process reports what it lacks. */
 static void collect(const run_env *env, collected *all, resource_kind kind, object_kind object, const char *id) {
   resource row = {0};
   uint64_t size;
@@ -243,7 +243,8 @@ static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_
   }
 }
 
-/* What moves objects waits for all that hold the store. The process may have published before it failed. */
+/* Gives back the hold that began with the first object, also if the process failed after that. Until then, no thread
+ * can move an object to quarantine. */
 static void let_go_of_made(const run_env *env, run_output *out) {
   if (out->holds) {
     objects_let_go(env->store);

@@ -166,7 +166,7 @@ static void report(const job *j, int fine, double seconds) {
   log_write(LOG_INFO, fields, "%s job %s", api_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
 }
 
-/* In a word, for its span. */
+/* The result of a failed run in one word, for its span. */
 static const char *why_failed(orb_context *ctx, const api_problem *problem) {
   const orb_status status = orb_context_error(ctx)->status;
   return problem->name ? problem->name : status != ORB_OK ? orb_status_name(status) : "given back";

@@ -210,7 +210,6 @@ static void distances_tell_a_pose(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(many_true_landmarks_do_not_spoil_a_pose),
-                                     cmocka_unit_test(a_twist_is_matched),
-                                     cmocka_unit_test(distances_tell_a_pose)};
+                                     cmocka_unit_test(a_twist_is_matched), cmocka_unit_test(distances_tell_a_pose)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
-#include "support_supermesh.h"
+#include "support_asset.h"
 
 /* Ellipsoids: axis s is 1 + s. Their normals are known: p / axis², scaled. */
 static double axis_of(int32_t shape, int c) {
@@ -21,40 +21,9 @@ static void ellipsoid(int32_t shape, const double p[3], double out[3]) {
   }
 }
 
-static int setup(void **state) {
-  return orb_context_create(NULL, (orb_context **)state) == ORB_OK ? 0 : -1;
-}
-static int teardown(void **state) {
-  orb_context_destroy(*state);
-  return 0;
-}
-
-static const char *const NAMES[] = {"one", "two", "two", "four", "five", "six", "seven", "eight"};
-
-static glb write_asset(orb_context *ctx, const synthetic *made, const orb_asset_options *options,
-                       orb_asset_facts *facts, orb_buffer *out) {
-  memset(out, 0, sizeof *out);
-  orb_status status = orb_asset_write(ctx, &made->supermesh, made->shapes, NAMES, options, facts, out);
-  if (status != ORB_OK) {
-    fail_msg("%s", orb_context_error(ctx)->detail);
-  }
-  return glb_open(out);
-}
-
-static const cJSON *mesh_of(const glb *file) {
-  const cJSON *meshes = cJSON_GetObjectItem(file->json, "meshes");
-  assert_int_equal(cJSON_GetArraySize(meshes), 1);
-  assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(file->json, "nodes")), 1);
-  return cJSON_GetArrayItem(meshes, 0);
-}
-
-static const cJSON *primitive_of(const glb *file, int index) {
-  return cJSON_GetArrayItem(cJSON_GetObjectItem(mesh_of(file), "primitives"), index);
-}
-
 /* Each triangle's three positions on each shape are those of a triangle of the supermesh, whatever the order. */
 static void check_positions(const glb *file, const synthetic *made, int shapes) {
-  const cJSON *primitive = primitive_of(file, 0);
+  const cJSON *primitive = asset_primitive(file, 0);
   const cJSON *targets = cJSON_GetObjectItem(primitive, "targets");
   int base = glb_attribute(cJSON_GetObjectItem(primitive, "attributes"), "POSITION");
   int indices = glb_attribute(primitive, "indices"), matched = 0;
@@ -81,7 +50,7 @@ static void check_positions(const glb *file, const synthetic *made, int shapes) 
 }
 
 static void check_normals(const glb *file, int shapes) {
-  const cJSON *primitive = primitive_of(file, 0);
+  const cJSON *primitive = asset_primitive(file, 0);
   const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
   int base = glb_attribute(attributes, "POSITION"), normal = glb_attribute(attributes, "NORMAL");
   for (int v = 0; v < glb_count(file, base); v++) {
@@ -108,7 +77,7 @@ static void two_shapes_are_base_and_target(void **state) {
   orb_asset_defaults(&options);
   orb_buffer bytes;
   orb_asset_facts facts;
-  glb file = write_asset(ctx, &made, &options, &facts, &bytes);
+  glb file = asset_write(ctx, &made, &options, &facts, &bytes);
   assert_int_equal(facts.vertex_count, made.supermesh.vertex_count);
   assert_int_equal(facts.target_count, 1);
   assert_int_equal(facts.morphed_attributes, 2);
@@ -130,7 +99,7 @@ static void animation_shows_every_shape_alone(void **state) {
   orb_asset_options options;
   orb_asset_defaults(&options);
   orb_buffer bytes;
-  glb file = write_asset(ctx, &made, &options, NULL, &bytes);
+  glb file = asset_write(ctx, &made, &options, NULL, &bytes);
   check_positions(&file, &made, 3);
   const cJSON *animations = cJSON_GetObjectItem(file.json, "animations");
   assert_int_equal(cJSON_GetArraySize(animations), 1);
@@ -149,7 +118,7 @@ static void animation_shows_every_shape_alone(void **state) {
   assert_true(alone[0] >= 2 && alone[1] >= 2 && alone[2] >= 1);
   assert_true(glb_value(&file, output, 0, 0) == 0 && glb_value(&file, output, 2 * keys - 2, 0) == 0);
   /* Equal names are told apart. */
-  const cJSON *names = cJSON_GetObjectItem(cJSON_GetObjectItem(mesh_of(&file), "extras"), "targetNames");
+  const cJSON *names = cJSON_GetObjectItem(cJSON_GetObjectItem(asset_mesh(&file), "extras"), "targetNames");
   assert_int_equal(cJSON_GetArraySize(names), 2);
   assert_string_equal(cJSON_GetArrayItem(names, 0)->valuestring, "two");
   assert_string_equal(cJSON_GetArrayItem(names, 1)->valuestring, "two (2)");
@@ -157,9 +126,9 @@ static void animation_shows_every_shape_alone(void **state) {
   orb_buffer_free(ctx, &bytes);
   options.animation = ORB_ANIMATION_NONE;
   options.normals = 0;
-  file = write_asset(ctx, &made, &options, NULL, &bytes);
+  file = asset_write(ctx, &made, &options, NULL, &bytes);
   assert_null(cJSON_GetObjectItem(file.json, "animations"));
-  assert_int_equal(glb_attribute(cJSON_GetObjectItem(primitive_of(&file, 0), "attributes"), "NORMAL"), -1);
+  assert_int_equal(glb_attribute(cJSON_GetObjectItem(asset_primitive(&file, 0), "attributes"), "NORMAL"), -1);
   glb_close(&file);
   orb_buffer_free(ctx, &bytes);
   synthetic_free(ctx, &made);
@@ -187,10 +156,10 @@ static void hard_edges_split_vertices(void **state) {
   orb_asset_defaults(&options);
   orb_buffer bytes;
   orb_asset_facts facts;
-  glb file = write_asset(ctx, &made, &options, &facts, &bytes);
+  glb file = asset_write(ctx, &made, &options, &facts, &bytes);
   assert_int_equal(facts.vertex_count, 24);
   check_positions(&file, &made, 2);
-  const cJSON *primitive = primitive_of(&file, 0);
+  const cJSON *primitive = asset_primitive(&file, 0);
   const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
   const cJSON *target = cJSON_GetArrayItem(cJSON_GetObjectItem(primitive, "targets"), 0);
   int base = glb_attribute(attributes, "POSITION"), delta = glb_attribute(target, "POSITION");
@@ -242,9 +211,9 @@ static void coinciding_vertices_are_kept_apart(void **state) {
   orb_asset_defaults(&options);
   orb_buffer bytes;
   orb_asset_facts facts;
-  glb file = write_asset(ctx, &made, &options, &facts, &bytes);
+  glb file = asset_write(ctx, &made, &options, &facts, &bytes);
   assert_int_equal(facts.nudged_vertices, 2);
-  int base = glb_attribute(cJSON_GetObjectItem(primitive_of(&file, 0), "attributes"), "POSITION"), near = 0;
+  int base = glb_attribute(cJSON_GetObjectItem(asset_primitive(&file, 0), "attributes"), "POSITION"), near = 0;
   for (int v = 0; v < glb_count(&file, base); v++) {
     for (int w = 0; w < v; w++) {
       double largest = 0;
@@ -261,183 +230,6 @@ static void coinciding_vertices_are_kept_apart(void **state) {
   synthetic_free(ctx, &made);
 }
 
-static void moved_copy(int32_t shape, const double p[3], double out[3]) {
-  double q[3];
-  ellipsoid(0, p, q);
-  q[1] *= 1.5; /* no symmetry that a rotation could hide in */
-  q[0] += 0.3 * p[1] * p[1] + 0.2 * p[2];
-  double turn = 2.1 * shape, scale = 1 + 2 * shape;
-  out[0] = scale * (cos(turn) * q[0] - sin(turn) * q[1]) + 5 * shape;
-  out[1] = scale * (sin(turn) * q[0] + cos(turn) * q[1]) - 7 * shape;
-  out[2] = scale * q[2] + shape;
-}
-
-/* A shape and its copy, rotated, scaled and shifted: a similarity undoes that, so all deltas vanish. */
-static void fit_undoes_a_similarity(void **state) {
-  orb_context *ctx = *state;
-  synthetic made = synthetic_make(ctx, 3, 2, moved_copy);
-  orb_asset_options options;
-  orb_asset_defaults(&options);
-  options.fit = ORB_FIT_SIMILARITY;
-  orb_buffer bytes;
-  glb file = write_asset(ctx, &made, &options, NULL, &bytes);
-  const cJSON *target = cJSON_GetArrayItem(cJSON_GetObjectItem(primitive_of(&file, 0), "targets"), 0);
-  int position = glb_attribute(target, "POSITION"), normal = glb_attribute(target, "NORMAL");
-  for (int v = 0; v < glb_count(&file, position); v++) {
-    for (int c = 0; c < 3; c++) {
-      assert_true(fabs(glb_value(&file, position, v, c)) < 1e-6);
-      assert_true(fabs(glb_value(&file, normal, v, c)) < 1e-6);
-    }
-  }
-  glb_close(&file);
-  orb_buffer_free(ctx, &bytes);
-  synthetic_free(ctx, &made);
-}
-
-/* A ball that is scaled, rotated about y or z and shifted. */
-static double copy_scale, copy_turn, copy_shift;
-static int copy_axis;
-static void placed_copy(int32_t shape, const double p[3], double out[3]) {
-  double scale = shape ? copy_scale : 1, turn = shape ? copy_turn * M_PI / 180 : 0;
-  int a = (copy_axis + 1) % 3, b = (copy_axis + 2) % 3;
-  double q[3] = {2 * p[0], 1.5 * p[1], p[2]};
-  out[a] = scale * (cos(turn) * q[a] - sin(turn) * q[b]);
-  out[b] = scale * (sin(turn) * q[a] + cos(turn) * q[b]);
-  out[copy_axis] = scale * q[copy_axis];
-  out[0] += shape ? copy_shift * 2 * sqrt(4 + 2.25 + 1) : 0; /* diagonals of the first shape */
-}
-
-/* auto moves a shape only beyond 1.5 times, 30° or half a diagonal, and reports what it did. */
-static void auto_fits_what_clearly_differs(void **state) {
-  orb_context *ctx = *state;
-  static const struct {
-    double scale, turn, shift;
-    int axis, moved;
-    double up;
-  } cases[] = {{1, 0, 0, 2, 0, 0},       {1.45, 25, 0.1, 2, 0, 0}, {1.6, 0, 0, 2, 1, 0},  {1 / 1.45, 0, 0, 2, 0, 0},
-               {1 / 1.6, 0, 0, 2, 1, 0}, {1, 29, 0, 2, 0, 0},      {1, 31, 0, 2, 1, 31},  {1, 90, 0, 0, 1, 90},
-               {1, 90, 0, 1, 1, 0},      {1, 0, 0.45, 2, 0, 0},    {1, 0, 0.55, 2, 1, 0}, {100, 180, 3, 0, 1, 180}};
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    copy_scale = cases[i].scale;
-    copy_turn = cases[i].turn;
-    copy_shift = cases[i].shift;
-    copy_axis = cases[i].axis;
-    synthetic made = synthetic_make(ctx, 3, 2, placed_copy);
-    orb_fit_report reports[2];
-    double m[32];
-    assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_AUTO, m, reports), ORB_OK);
-    assert_int_equal(reports[0].kind, ORB_FIT_NONE);
-    assert_int_equal(reports[1].kind, cases[i].moved ? ORB_FIT_SIMILARITY : ORB_FIT_NONE);
-    assert_true(fabs(reports[1].scale - (cases[i].moved ? 1 / copy_scale : 1)) < 1e-9);
-    assert_true(fabs(reports[1].rotation_degrees - (cases[i].moved ? copy_turn : 0)) < 1e-5);
-    assert_true(fabs(reports[1].translation_relative - (cases[i].moved ? copy_shift : 0)) < 1e-6 * fmax(1, copy_scale));
-    assert_true(fabs(reports[1].up_degrees - cases[i].up) < 1e-5);
-    synthetic_free(ctx, &made);
-  }
-}
-
-/* A body, and another one of other proportions that leans forward, ten times as large, with z up. */
-static void leaning_copy(int32_t shape, const double p[3], double out[3]) {
-  double q[3] = {p[0], 1.2 * p[1], 0.5 * p[2]};
-  if (shape == 0) {
-    memcpy(out, q, sizeof q);
-    return;
-  }
-  q[2] *= 2;
-  q[0] = 0.6 * q[0] + 0.5 * q[1];
-  out[0] = 10 * q[0];
-  out[1] = -10 * q[2];
-  out[2] = 10 * q[1];
-}
-
-/* The best rotation of the leaning body would tip it over backwards. auto leaves its posture and turns it by the right
- * angle between the files' axes; a similarity that is asked for is the best one. */
-static void auto_leaves_a_posture(void **state) {
-  orb_context *ctx = *state;
-  synthetic made = synthetic_make(ctx, 3, 2, leaning_copy);
-  orb_fit_report reports[2];
-  double m[32];
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_AUTO, m, reports), ORB_OK);
-  assert_int_equal(reports[1].kind, ORB_FIT_SIMILARITY);
-  assert_true(fabs(reports[1].rotation_degrees - 90) < 1e-6);
-  for (int k = 0; k < 3; k++) { /* z of its file becomes y */
-    assert_true(fabs(m[16 + 4 * 2 + k] / reports[1].scale - (k == 1)) < 1e-9);
-  }
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_SIMILARITY, m, reports), ORB_OK);
-  assert_true(m[16 + 4 * 2] / reports[1].scale < -0.1);
-  synthetic_free(ctx, &made);
-}
-
-/* A pear, and a wider one, rotated by 50° and three times as large. */
-static void mistaken_copy(int32_t shape, const double p[3], double out[3]) {
-  const double q[3] = {p[0] * (1.2 - p[1]), 2 * p[1], p[2] * (1.2 - p[1])};
-  const double turn = shape ? 50 * M_PI / 180 : 0, scale = shape ? 3 : 1, wide = shape ? 1.5 : 1;
-  out[0] = scale * wide * (cos(turn) * q[0] - sin(turn) * q[1]);
-  out[1] = scale * (sin(turn) * q[0] + cos(turn) * q[1]);
-  out[2] = scale * q[2];
-}
-
-/* A match that may be wrong rotates no shape, but scales it: unless one shape is a copy of the other, however turned.
- */
-static void an_unsure_match_rotates_nothing(void **state) {
-  orb_context *ctx = *state;
-  static const struct {
-    void (*copy)(int32_t shape, const double p[3], double out[3]);
-    orb_fit fit;
-    int turns;
-  } cases[] = {
-      {mistaken_copy, ORB_FIT_AUTO, 1}, {mistaken_copy, ORB_FIT_AUTO_UNSURE, 0}, {placed_copy, ORB_FIT_AUTO_UNSURE, 1}};
-  copy_scale = 3, copy_turn = 50, copy_axis = 2, copy_shift = 0;
-  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    synthetic made = synthetic_make(ctx, 3, 2, cases[i].copy);
-    orb_fit_report reports[2];
-    double m[32];
-    assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, cases[i].fit, m, reports), ORB_OK);
-    assert_int_equal(reports[1].kind, ORB_FIT_SIMILARITY);
-    assert_true(reports[1].scale > 1 / 4.5 && reports[1].scale < 1 / 2.9);
-    if (cases[i].turns) {
-      assert_true(reports[1].rotation_degrees > 30);
-    } else {
-      assert_true(reports[1].rotation_degrees == 0 && reports[1].up_degrees == 0);
-    }
-    synthetic_free(ctx, &made);
-  }
-}
-
-/* The matrix of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
-static void the_transform_is_the_inverse(void **state) {
-  orb_context *ctx = *state;
-  synthetic made = synthetic_make(ctx, 3, 2, moved_copy);
-  double m[32];
-  static const double stay[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_NONE, m, NULL), ORB_OK);
-  for (int i = 0; i < 32; i++) {
-    assert_true(m[i] == stay[i % 16]);
-  }
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_SIMILARITY, m, NULL), ORB_OK);
-  double c = cos(2.1) / 3, d = sin(2.1) / 3, shift[3] = {5, -7, 1};
-  double turn[3][3] = {{c, d, 0}, {-d, c, 0}, {0, 0, 1.0 / 3}};
-  for (int i = 0; i < 16; i++) {
-    assert_true(m[i] == stay[i]);
-  }
-  for (int row = 0; row < 3; row++) {
-    double moved = 0;
-    for (int column = 0; column < 3; column++) {
-      assert_true(fabs(m[16 + 4 * column + row] - turn[row][column]) < 1e-9);
-      moved -= turn[row][column] * shift[column];
-    }
-    assert_true(fabs(m[28 + row] - moved) < 1e-8);
-    assert_true(m[16 + 4 * row + 3] == 0);
-  }
-  assert_true(m[31] == 1);
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_RIGID, m, NULL), ORB_OK);
-  for (int column = 0; column < 3; column++) {
-    const double *a = m + 16 + 4 * column;
-    assert_true(fabs(a[0] * a[0] + a[1] * a[1] + a[2] * a[2] - 1) < 1e-12);
-  }
-  synthetic_free(ctx, &made);
-}
-
 /* The same bytes for one thread and for four. */
 static void threads_do_not_matter(void **state) {
   (void)state;
@@ -449,7 +241,7 @@ static void threads_do_not_matter(void **state) {
     synthetic made = synthetic_make(contexts[i], 5, 3, ellipsoid);
     orb_asset_options options;
     orb_asset_defaults(&options);
-    glb file = write_asset(contexts[i], &made, &options, NULL, &bytes[i]);
+    glb file = asset_write(contexts[i], &made, &options, NULL, &bytes[i]);
     glb_close(&file);
     synthetic_free(contexts[i], &made);
   }
@@ -518,13 +310,13 @@ static void texture_seams_are_not_crossed(void **state) {
   orb_asset_facts facts;
   orb_buffer bytes = {0};
   orb_asset_defaults(&options);
-  assert_int_equal(orb_asset_write(ctx, supermesh, shapes, NAMES, &options, &facts, &bytes), ORB_OK);
+  assert_int_equal(orb_asset_write(ctx, supermesh, shapes, asset_names, &options, &facts, &bytes), ORB_OK);
   assert_int_equal(facts.primitive_count, 2);
   assert_true(facts.vertex_count > supermesh->vertex_count);
   glb file = glb_open(&bytes);
   int checked = 0;
   for (int m = 0; m < 2; m++) {
-    const cJSON *primitive = primitive_of(&file, m);
+    const cJSON *primitive = asset_primitive(&file, m);
     const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
     int base = glb_attribute(attributes, "POSITION"), uv = glb_attribute(attributes, "TEXCOORD_0");
     int indices = glb_attribute(primitive, "indices");
@@ -587,7 +379,7 @@ static void running_out_of_memory_is_an_error(void **state) {
     options.fit = ORB_FIT_RIGID;
     orb_buffer bytes = {0};
     f.left = n;
-    orb_status status = orb_asset_write(ctx, &made.supermesh, made.shapes, NAMES, &options, NULL, &bytes);
+    orb_status status = orb_asset_write(ctx, &made.supermesh, made.shapes, asset_names, &options, NULL, &bytes);
     f.left = 1 << 20;
     orb_buffer_free(ctx, &bytes);
     synthetic_free(ctx, &made);
@@ -603,16 +395,11 @@ static void running_out_of_memory_is_an_error(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test_setup_teardown(two_shapes_are_base_and_target, setup, teardown),
-      cmocka_unit_test_setup_teardown(animation_shows_every_shape_alone, setup, teardown),
-      cmocka_unit_test_setup_teardown(hard_edges_split_vertices, setup, teardown),
-      cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, setup, teardown),
-      cmocka_unit_test_setup_teardown(fit_undoes_a_similarity, setup, teardown),
-      cmocka_unit_test_setup_teardown(auto_leaves_a_posture, setup, teardown),
-      cmocka_unit_test_setup_teardown(an_unsure_match_rotates_nothing, setup, teardown),
-      cmocka_unit_test_setup_teardown(the_transform_is_the_inverse, setup, teardown),
-      cmocka_unit_test_setup_teardown(auto_fits_what_clearly_differs, setup, teardown),
-      cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, setup, teardown),
+      cmocka_unit_test_setup_teardown(two_shapes_are_base_and_target, asset_setup, asset_teardown),
+      cmocka_unit_test_setup_teardown(animation_shows_every_shape_alone, asset_setup, asset_teardown),
+      cmocka_unit_test_setup_teardown(hard_edges_split_vertices, asset_setup, asset_teardown),
+      cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, asset_setup, asset_teardown),
+      cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, asset_setup, asset_teardown),
       cmocka_unit_test(threads_do_not_matter),
       cmocka_unit_test(running_out_of_memory_is_an_error),
   };

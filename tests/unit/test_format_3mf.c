@@ -306,6 +306,39 @@ static void test_bombs(void **state) {
   }
 }
 
+/* A comment, an instruction and a tag of exactly 64 KiB pass; with one byte more they are refused, wherever they lie.
+ */
+static void test_tokens(void **state) {
+  (void)state;
+  enum { MOST = 1 << 16 };
+  static const struct {
+    const char *before, *after;
+  } tokens[] = {{"<!--", "-->"}, {"<?i ", "?>"}, {"<x a=\"", "\"/>"}, {"<x a=\"", "\"></x>"}};
+  for (size_t kind = 0; kind < sizeof tokens / sizeof *tokens; kind++) {
+    for (int i = 0; i < 6; i++) {
+      const int more = i & 1, spaces = i / 2 * 30000;
+      const char *end = strchr(tokens[kind].after, '>') + 1;
+      const size_t frame = strlen(tokens[kind].before) + (size_t)(end - tokens[kind].after);
+      char *text = malloc(4 * MOST), *at = text;
+      orb_mesh mesh;
+      assert_non_null(text);
+      at += sprintf(at, "<model " CORE "><resources>" OBJECT(1, "") "%*s%s", spaces, "", tokens[kind].before);
+      memset(at, 'a', MOST + (size_t)more - frame);
+      at += MOST + (size_t)more - frame;
+      sprintf(at, "%s</resources><build><item objectid=\"1\"/></build></model>", tokens[kind].after);
+      orb_status status = read_package(text, NULL, 1, 0, &mesh);
+      free(text);
+      if (more) {
+        assert_int_not_equal(status, ORB_OK);
+        assert_non_null(strstr(orb_context_error(ctx)->detail, "more than 65536 bytes"));
+      } else {
+        assert_int_equal(status, ORB_OK);
+        orb_mesh_free(ctx, &mesh);
+      }
+    }
+  }
+}
+
 /* Every beginning, and every byte changed, gives a mesh or an error. */
 static void test_damage(void **state) {
   (void)state;
@@ -368,7 +401,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_units),    cmocka_unit_test(test_placement), cmocka_unit_test(test_parts),
       cmocka_unit_test(test_archives), cmocka_unit_test(test_colours),   cmocka_unit_test(test_errors),
-      cmocka_unit_test(test_bombs),    cmocka_unit_test(test_damage),    cmocka_unit_test(test_budget),
+      cmocka_unit_test(test_bombs),    cmocka_unit_test(test_tokens),    cmocka_unit_test(test_damage),
+      cmocka_unit_test(test_budget),
   };
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -460,6 +460,47 @@ static void test_forgetting(void **state) {
 }
 
 /* Any number of tokens is possible; all are listed by name. */
+typedef struct number {
+  char *all; /* the numbers of the writes in the order in which they ran */
+  char own;
+} number;
+
+static int note_number(database *db, void *arg) {
+  const number *n = arg;
+  (void)db;
+  __atomic_store_n(n->all + strlen(n->all), n->own, __ATOMIC_RELEASE);
+  return SQL_OK;
+}
+
+static void *number_of(char *all, char own) {
+  number *n = malloc(sizeof *n);
+  assert_non_null(n);
+  *n = (number){all, own};
+  return n;
+}
+
+/* Writes that wait for others run in order, with the next one that somebody waits for, or soon without any. */
+static void test_gathered(void **state) {
+  stored *s = *state;
+  char all[64] = "";
+  for (int i = 0; i < 5; i++) {
+    catalogue_write_gathered(s->cat, note_number, number_of(all, (char)('a' + i)));
+  }
+  number last = {all, 'z'};
+  assert_int_equal(catalogue_write(s->cat, note_number, &last), STORE_OK);
+  assert_string_equal(all, "abcdez");
+  char alone[64] = "";
+  catalogue_write_gathered(s->cat, note_number, number_of(alone, 'a'));
+  for (int i = 0; i < 1000 && !__atomic_load_n(alone, __ATOMIC_ACQUIRE); i++) {
+    usleep(5000);
+  }
+  assert_string_equal(alone, "a");
+  catalogue_write_gathered(s->cat, note_number, number_of(alone, 'b'));
+  catalogue_close(s->cat); /* completes all */
+  assert_string_equal(alone, "ab");
+  assert_int_equal(stored_open(s), STORE_OK);
+}
+
 static void test_many_tokens(void **state) {
   stored *s = *state;
   enum { MANY = 1100 };
@@ -489,6 +530,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_owners_of_results, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_meshes, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_forgetting, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_gathered, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_many_tokens, stored_setup, stored_teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -2,6 +2,8 @@
  */
 #include <fcntl.h>
 #include <limits.h>
+#include <netinet/in.h>
+#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +11,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -204,6 +208,78 @@ static int put_file(object_cache *cache, const char *folder, int i) {
   return fd;
 }
 
+/* A server that answers 403 to every signature more than 15 minutes from its time, as S3 does, and notes all. */
+typedef struct fake_s3 {
+  int listening, requests, accepted;
+  int64_t now; /* Unix time */
+  char dates[8][S3_DATE];
+} fake_s3;
+
+static void *serve(void *user) {
+  fake_s3 *f = user;
+  for (int fd; (fd = accept(f->listening, NULL, NULL)) >= 0; close(fd)) {
+    char text[8192] = "", date[64], least[S3_DATE], most[S3_DATE], answer[256];
+    size_t size = 0;
+    for (ssize_t n = 1; n > 0 && size + 1 < sizeof text && !strstr(text, "\r\n\r\n"); size += n > 0 ? (size_t)n : 0) {
+      n = read(fd, text + size, sizeof text - 1 - size);
+    }
+    const char *signed_at = strstr(text, "x-amz-date:");
+    const time_t now = (time_t)f->now;
+    struct tm parts;
+    s3_date((long long)f->now - 900, least);
+    s3_date((long long)f->now + 900, most);
+    if (!signed_at || f->requests == 8) {
+      continue;
+    }
+    char *noted = f->dates[f->requests++];
+    snprintf(noted, S3_DATE, "%.16s", signed_at + strlen("x-amz-date:"));
+    const int fine = strcmp(noted, least) >= 0 && strcmp(noted, most) <= 0;
+    f->accepted += fine;
+    strftime(date, sizeof date, "%a, %d %b %Y %H:%M:%S GMT", gmtime_r(&now, &parts));
+    int n = snprintf(answer, sizeof answer, "HTTP/1.1 %s\r\nDate: %s\r\nContent-Length: 0\r\nConnection: close\r\n\r\n",
+                     fine ? "200 OK" : "403 Forbidden", date);
+    assert_int_equal(write(fd, answer, (size_t)n), n);
+  }
+  return NULL;
+}
+
+/* A clock of this machine that is a day ahead of S3's costs one request more, once; links have S3's time as well. */
+static void test_other_clock(void **state) {
+  (void)state;
+  fake_s3 f = {.listening = socket(AF_INET, SOCK_STREAM, 0), .now = (int64_t)time(NULL) - 86400};
+  struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+  socklen_t length = sizeof address;
+  assert_int_equal(bind(f.listening, (struct sockaddr *)&address, sizeof address), 0);
+  assert_int_equal(listen(f.listening, 4), 0);
+  assert_int_equal(getsockname(f.listening, (struct sockaddr *)&address, &length), 0);
+  pthread_t thread;
+  assert_int_equal(pthread_create(&thread, NULL, serve, &f), 0);
+  s3_options options = {.keys = {.access = "access", .secret = "secret"}, .authorities = ""};
+  char url[120], link[4096], day[S3_DATE], expected[64];
+  const char *why = NULL;
+  snprintf(url, sizeof url, "s3://bucket?endpoint=http://127.0.0.1:%d&region=here&path_style=1",
+           ntohs(address.sin_port));
+  assert_true(s3_url_read(url, &options.place, &why));
+  s3 *store = s3_open(&options);
+  const s3_request request = {.method = "GET", .key = "name", .to = -1, .tries = 1};
+  for (int i = 0; i < 2; i++) {
+    s3_answer answer;
+    s3_send(store, &request, &answer);
+    assert_int_equal(answer.status, 200);
+    free(answer.text);
+  }
+  assert_true(s3_link(store, "name", 60, "", link, sizeof link));
+  s3_date((long long)f.now, day);
+  snprintf(expected, sizeof expected, "X-Amz-Date=%.8s", day);
+  assert_non_null(strstr(link, expected));
+  s3_close(store);
+  shutdown(f.listening, SHUT_RDWR);
+  pthread_join(thread, NULL);
+  close(f.listening);
+  assert_int_equal(f.requests, 3);
+  assert_int_equal(f.accepted, 2);
+}
+
 /* What was used longest ago leaves, and the sum never exceeds the bound. */
 static void test_bound(void **state) {
   (void)state;
@@ -249,9 +325,9 @@ static void test_bound(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_s3_examples), cmocka_unit_test(test_suite), cmocka_unit_test(test_presigned),
-      cmocka_unit_test(test_urls),        cmocka_unit_test(test_keys),  cmocka_unit_test(test_elements),
-      cmocka_unit_test(test_bound),
+      cmocka_unit_test(test_s3_examples), cmocka_unit_test(test_suite),       cmocka_unit_test(test_presigned),
+      cmocka_unit_test(test_urls),        cmocka_unit_test(test_keys),        cmocka_unit_test(test_elements),
+      cmocka_unit_test(test_bound),       cmocka_unit_test(test_other_clock),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
 }

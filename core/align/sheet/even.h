@@ -14,7 +14,7 @@ typedef struct orb_even_shapes {
   int32_t count;
 } orb_even_shapes;
 
-/* Embeds the shapes anew with the energy of angles. A sphere that is not certified leaves the given one. Free `out` in
+/* Embeds the shapes again with the energy of angles. A sphere that is not certified leaves the given one. Free `out` in
  * any case. */
 ORB_MUST_CHECK orb_status orb_even_shapes_create(orb_context *ctx, const orb_align_shape *shapes, int32_t count,
                                                  orb_even_shapes *out);

@@ -21,9 +21,9 @@ ORB_API void orb_align_defaults(orb_align_options *options);
  *   with one_way, to the first shape's points. The influence of a landmark ends at its radius. A step that folds is
  *   untangled locally. If that fails, the step is halved several times; if that fails too, the sphere is relaxed before
  *   it. Landmarks that still do not get past each other meet as in pin, where edges are split.
- * - pin: embeds the shapes anew with the landmarks as constraints, which meet at their spherical means. Where landmarks
- *   would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's points or at
- *   new ones. After pin and rbf the vertices of a landmark have bit-equal points on all shapes.
+ * - pin: embeds the shapes again with the landmarks as constraints, which meet at their spherical means. Where
+ * landmarks would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's
+ * points or at new ones. After pin and rbf the vertices of a landmark have bit-equal points on all shapes.
  * - auto: pin if there are landmarks. Without landmarks, auto first searches for rotations, then matches each later
  * shape with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both shapes
  *   least. The composed map sends each vertex to where the match takes it. The preset fast only searches for rotations.

@@ -4,7 +4,7 @@
 
 #include "remesh/placed/placed_net.h"
 
-/* Flips edge h and assigns the items of its two triangles anew. Ask first whether it may be flipped. */
+/* Flips edge h and assigns the items of its two triangles again. Ask first whether it may be flipped. */
 void orb_placed_flip(orb_placed_net *placed, int32_t h);
 
 /* The greatest squared distance of the items in the two triangles of edge h = a→b to the triangles (c,d,b) and (d,c,a)

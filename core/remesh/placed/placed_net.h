@@ -59,7 +59,7 @@ static inline const double *orb_placed_normal(const orb_placed_net *placed, int3
 const double *orb_placed_item_point(const orb_placed_net *placed, int32_t item);
 const double *orb_placed_item_position(const orb_placed_net *placed, int32_t item);
 
-/* Splits net edge h at p if all four triangles stay positive, and assigns the items of the two triangles anew. Returns
+/* Splits net edge h at p if all four triangles stay positive, and assigns the items of the two triangles again. Returns
  * the new vertex, or −1. Needs room for one vertex. */
 int32_t orb_placed_split(orb_placed_net *placed, int32_t h, const double p[3]);
 
