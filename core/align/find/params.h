@@ -18,8 +18,8 @@ enum {
                              that grows with the square of this */
   ORB_FIND_FINE = 8000,   /* vertices of the finer copies on which the best match is settled: with 4000, fingers are too
                              coarse for starts to follow, and maps of 20 pairs have 2 % more energy */
-  ORB_FIND_SPECTRAL = 4, /* spectral maps that are tried: of 40 pairs of posed people, the right one was among the first
-                            two in 39 */
+  ORB_FIND_SPECTRAL = 6, /* spectral maps that are tried: of 40 pairs of posed people, the right one was among the first
+                            two in 39, and the sixth of emmy-neutral and dan-twist. Each takes 0.03 s */
   ORB_FIND_ROTATIONS = 3 /* rotations of the spheres that are tried: the best of the rotation search */
 };
 
@@ -33,12 +33,12 @@ static const double ORB_FIND_SPECTRAL_BEHIND = 0.8;
  * differ by a factor of 1.5 where the map is right. */
 static const double ORB_FIND_BEHIND = 2;
 /* The energy of the map of the best match above which the next best match is tried as well, unless that bends so many
- * times as much. Three in four right maps of two people have at most 1.2. Of dan-neutral and dan-twist the right match
- * bends 3.2 times as much as the wrong one. */
+ * times as much. Three in four right maps of two people have at most 1.2. The factor is from rougher registrations, in
+ * which the right match of dan-neutral and dan-twist bent 3.2 times as much as the wrong one. */
 static const double ORB_FIND_OTHER_ABOVE = 1.2, ORB_FIND_OTHER_BEHIND = 4;
 /* The share that the map of the next best match may have of what the best one's bulk is above 1, where it is taken in
- * that one's place. Of dan-neutral and dan-twist the bulk of the right map has 0.6 to 0.91, by the last bits of the
- * sums; other pairs of people, whose best match was right, had 1.02 to 1.6. */
+ * that one's place. In these registrations the bulk of the right map of that pair had 0.6 to 0.91, by the last bits of
+ * the sums; other pairs of people, whose best match was right, had 1.02 to 1.6. */
 static const double ORB_FIND_OTHER_GAIN = 0.95;
 /* What a match bends the shapes, above which walks are tried before the start from its targets. Of 70 pairs, people in
  * poses bend by 0.02 to 0.15, and the start leads to the better map; other shapes by 0.2 to 0.5, and a walk does. */
