@@ -10,7 +10,8 @@
 #include "base/state.h"
 
 void orb_error_reset(orb_error *error) {
-  memset(error, 0, offsetof(orb_error, loop_vertices)); /* these are as many as loop_start says */
+  memset(error, 0, offsetof(orb_error, loop_start)); /* loop_count says how much of the rest is set */
+  error->loop_start[0] = 0;
   error->line = error->offset = error->boundary_loops = error->genus = -1;
   error->shape = error->transfer = -1;
 }
