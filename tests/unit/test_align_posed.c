@@ -139,8 +139,7 @@ static void many_true_landmarks_do_not_spoil_a_pose(void **state) {
   unload(ctx, bodies);
 }
 
-/* One body is twisted. A match that swaps left and right with front and back would bend the bodies little, and take
- * places half a body away. */
+/* One body is twisted. A match that swaps left and right with front and back would take places half a body away. */
 static void a_twist_is_matched(void **state) {
   (void)state;
 #ifdef __SANITIZE_ADDRESS__

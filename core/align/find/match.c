@@ -27,7 +27,7 @@ typedef struct trial {
   orb_elastic_pose pose[2];
   double bend[2];
   double rough; /* cost in the first direction alone */
-  double cost;  /* INFINITY: dropped, since its rough cost is too far behind */
+  double cost;  /* INFINITY: dropped, since its rough cost is too far behind or landmarks contradict it */
 } trial;
 
 /* How a shape is scaled: to area 4π, around the middle of its box. */
@@ -221,8 +221,9 @@ static int32_t best_of(const search *t) {
 /* Drops the trials whose pose s takes the landmarks elsewhere. */
 static void drop_against_hint(search *t, int s) {
   for (int32_t i = 0; i < t->count; i++) {
-    if (orb_hint_off(&t->hint, &t->copy[s], s, t->trial[i].pose[s].position) > ORB_FIND_HINT_OFF) {
-      t->trial[i].cost = INFINITY;
+    trial *one = &t->trial[i];
+    if (one->cost < INFINITY && orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) > ORB_FIND_HINT_OFF) {
+      one->cost = one->rough = INFINITY;
     }
   }
 }
@@ -316,7 +317,7 @@ static void list_different(search *t) {
 
 /* Vertices spread over the first shape, and those nearest to where a trial takes them. */
 static orb_status write_pairs(const search *t, const trial *one, orb_match_pairs *out) {
-  out->count = 0;
+  memset(out, 0, sizeof *out);
   const orb_coarse_copy *copy = t->copy;
   int32_t sample[ORB_MATCH_PAIRS];
   orb_nearest *tree;
@@ -374,7 +375,7 @@ static orb_status write_ranking(const search *t, orb_match *out) {
 
 /* Registers a trial's second copy again with the landmarks as anchors. They only excluded maps until here, since they
  * would draw a wrong one to their partners as well. Where they bend it far more than it was bent, they have twisted a
- * limb or the waist, and the pose without them stays. */
+ * limb or the waist, and the pose without them stays until it settles. */
 static orb_status draw_to_landmarks(const search *t, trial *one) {
   const orb_mesh *copy = &t->copy[1].mesh;
   orb_elastic_anchor *anchors = NULL;

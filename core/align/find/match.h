@@ -60,7 +60,7 @@ typedef struct orb_match {
  * bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
-/* The target of other[k], which the caller frees: NULL on failure. The meshes of the match must still be there. About
+/* The target of other[k], which the caller frees, also on failure. The meshes of the match must still be there. About
  * 0.4 s of one thread. */
 ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);
 /* Makes other[k] the best map; the former best map becomes the first of the others. target: that of other[k]; the match

@@ -100,14 +100,22 @@ static int sweeps_of(const orb_map_run *c, const orb_refiner *r, int first, int 
   return rough && count > p->level.rough_sweeps ? p->level.rough_sweeps : count;
 }
 
-orb_status orb_map_level_next(orb_map_run *c, orb_refiner *r, orb_map_level *l, unsigned char *known, double pull) {
+orb_status orb_map_level_next(orb_map_run *c, orb_refiner *r, orb_map_level *l, unsigned char *known, double pull,
+                              int *has_room) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
   const orb_map_rules hard = orb_map_hard(&c->params);
   memcpy(known, r->alive, (size_t)c->vertex_count);
   double wanted = c->params.level.growth * r->live;
   wanted = wanted > c->vertex_count / c->params.level.last_growth ? c->vertex_count : wanted;
+  *has_room = 1;
   while (r->live < c->vertex_count && r->live < wanted) {
-    ORB_TRY(orb_refiner_undo_round(c->ctx, r, r->settings.blend));
+    const orb_status status = orb_refiner_undo_round(c->ctx, r, r->settings.blend);
+    if (status == ORB_E_NOT_CERTIFIED) {
+      orb_error_clear(c->ctx);
+      *has_room = 0;
+      return ORB_OK;
+    }
+    ORB_TRY(status);
   }
   orb_map_level_free(c->ctx, l);
   ORB_TRY(load_level(c, r, known, l));
@@ -144,10 +152,9 @@ orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *
     if (last) {
       break;
     }
-    status = orb_map_level_next(c, r, l, known, pull);
-    if (status == ORB_E_NOT_CERTIFIED) { /* crumples left a vertex no room */
-      orb_error_clear(c->ctx);
-      status = ORB_OK;
+    int has_room;
+    ORB_GO(status, orb_map_level_next(c, r, l, known, pull, &has_room), done);
+    if (!has_room) {
       *failed = 1;
       break;
     }

@@ -1,5 +1,5 @@
-/* The targets are smoothed first, by a registration in space through samples of them, unless they fold the first level
- * less as they are. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h) clears what
+/* The targets are smoothed first, by a registration in space through samples of them, if the first level then has
+ * fewer flips. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h) clears what
  * flips are left. Where the targets are folded it has crumpled, in the pockets of a face and where limbs touch. So it
  * is ironed (engine/iron.h) and drawn to the targets at once, which smooths most of it. Where that leads to no map of
  * shapes that correspond, passes through samples of the best map follow, and then two more starts, until one is such a

@@ -41,7 +41,12 @@ static orb_status optimise(orb_map_run *c, int32_t guides, orb_map_walked *w) {
     orb_map_level_store(c, &w->level, w->refiner);
     w->energy = orb_map_level_energy(&w->level);
     if (!last) {
-      ORB_GO(status, orb_map_level_next(c, w->refiner, &w->level, known, 0), done);
+      int has_room;
+      ORB_GO(status, orb_map_level_next(c, w->refiner, &w->level, known, 0, &has_room), done);
+      if (!has_room) {
+        w->energy = INFINITY;
+        break;
+      }
     } else if (guides == 0 && w->energy > p->walked.twisted) {
       w->energy = INFINITY;
     }

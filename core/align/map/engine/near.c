@@ -106,6 +106,7 @@ orb_status orb_map_keep_usable(orb_map_run *c, const orb_map_level *l, const int
     if (!mark[i]) {
       c->usable[v] = 1;
       c->target_place[v] = l->place[i];
+      c->doubted[v] = 0;
     }
   }
   c->has_usable = 1;

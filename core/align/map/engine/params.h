@@ -295,7 +295,8 @@ typedef struct orb_map_params {
 
   /* The place of each spatial target on the fixed shape. */
   struct {
-    double facing;        /* least cosine between the normals at the nearest point, or vertices compete instead by */
+    double facing;        /* least cosine between the normals at the nearest point. With less, a start on spheres that
+                             keep angles doubts the place; elsewhere vertices compete instead by */
     double normal_weight; /* distance and this weight of |n − n'|² against |x − x'|² */
     int32_t search;       /* triangles beyond which only every second, third, … is searched for a vertex */
     double jitter;        /* of barycentric coordinates: vertices that share a point cannot be untangled */

@@ -60,9 +60,9 @@ void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_
   }
 }
 
-/* Clears the flips of a level, by untangling and then by unfolding what is left. *flips: those left, and the level is
- * as it was if there are any. Either may draw a triangle over half of the sphere, and then all flips go, but the level
- * covers the sphere twice. So a step that does this to a level that covered it once is undone. */
+/* Clears the flips of a level, by untangling and then by unfolding what is left. *flips: those that the attempt left;
+ * if there are any, the level is as it was. Either may draw a triangle over half of the sphere, and then all flips go,
+ * but the level covers the sphere twice. So a step that does this to a level that covered it once is undone. */
 static orb_status clear_now(orb_map_run *c, orb_map_level *l, double *copy, int32_t *flips) {
   const orb_map_params *params = &c->params;
   const size_t size = 3 * (size_t)l->count * sizeof *copy;

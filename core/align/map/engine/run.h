@@ -60,7 +60,7 @@ typedef struct orb_map_run {
   double *target;             /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
-  unsigned char *doubted;  /* vertices whose target_place faces another way than they do; a start smooths them */
+  unsigned char *doubted;  /* vertices whose target_place faces another way: the first level of a start smooths them */
   unsigned char *keep;     /* vertices that stay on every level: those of pairs, pinned, and those of springs, free */
   unsigned char *usable;   /* vertices whose target_place is from a start that was nearly a map, mesh order */
   int has_usable;
