@@ -33,7 +33,10 @@ function samples(): Plugin {
   };
 }
 
-/** Writes licenses.txt with the licences of the bundled packages (`dependencies` in package.json), as they require. */
+/**
+ * Writes licenses.txt with the licences of the bundled packages (`dependencies` in package.json), as they require, and of
+ * Draco's decoder, which three has without its licence: that is Apache 2.0, word for word the licence of TypeScript.
+ */
 function licenses(): Plugin {
   const read = (path: string) => readFileSync(here(path), 'utf8').trim();
   return {
@@ -44,18 +47,31 @@ function licenses(): Plugin {
       const parts = Object.entries(dependencies).map(
         ([name, version]) => `${name} ${version}\n\n${read(`node_modules/${name}/LICENSE`)}\n`,
       );
+      const draco = read('node_modules/typescript/LICENSE.txt');
+      if (!/^Apache License\s+Version 2\.0/.test(draco)) throw new Error('The licence of TypeScript is another one.');
+      parts.push(`Draco\n\nCopyright The Draco Authors\n\n${draco}\n`);
       const source = [`orbmorph\n\n${read('../../LICENSE')}\n`, ...parts].join(`\n${'-'.repeat(80)}\n\n`);
       this.emitFile({ type: 'asset', fileName: 'licenses.txt', source });
     },
   };
 }
 
+/** Makes Draco's decoder a module: it lies in a package of modules, and is a script that names one function. */
+function draco(): Plugin {
+  return {
+    name: 'orbmorph-draco',
+    transform: (code, id) =>
+      /draco_decoder\.js/.test(id) ? { code: `${code}\nexport default DracoDecoderModule;\n`, map: null } : undefined,
+  };
+}
+
 export default defineConfig({
   base: './',
-  plugins: [samples(), licenses()],
+  plugins: [samples(), licenses(), draco()],
   resolve: { alias: { orbmorph: here('../js/src/index.js') } },
   esbuild: { jsx: 'automatic', jsxImportSource: 'preact' },
-  worker: { format: 'es' },
+  worker: { format: 'es', plugins: () => [draco()] },
+  optimizeDeps: { exclude: ['three/examples/jsm/libs/draco/gltf/draco_decoder.js'] },
   build: {
     target: 'es2022',
     assetsInlineLimit: 0,

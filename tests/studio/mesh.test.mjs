@@ -17,13 +17,26 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress', 'others', 'mended']
+      contents: [
+        'parse',
+        'geometry',
+        'bvh',
+        'morph',
+        'distortion',
+        'symmetry',
+        'repairs',
+        'dress',
+        'others',
+        'mended',
+        'meshopt',
+      ]
         .map((name) => `export * from './${name}.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
       loader: 'ts',
     },
     bundle: true,
+    external: ['three/*'],
     format: 'esm',
     target: 'node18',
     outfile: out,
@@ -745,4 +758,47 @@ test('another match: it flips if limbs change sides, and neither stay nor trade 
     false,
     'front to back',
   );
+});
+
+test('meshopt: streams are decoded as meshoptimizer decodes them, and damaged ones end', async () => {
+  // @types/three has it as a dependency
+  const { MeshoptEncoder, MeshoptDecoder } = createRequire(join(root, 'client/web/package.json'))('meshoptimizer');
+  await Promise.all([MeshoptEncoder.ready, MeshoptDecoder.ready]);
+  let seed = 1;
+  const random = (below) => (seed = (seed * 48271) % 2147483647) % below;
+  const bytesOf = (list) => new Uint8Array(list.buffer);
+  const streams = [];
+  const attributes = (rows, count, byteStride, filter) =>
+    streams.push([
+      { mode: 'ATTRIBUTES', count, byteStride, filter },
+      MeshoptEncoder.encodeVertexBuffer(rows, count, byteStride),
+    ]);
+  // noise: how many bits the steps need
+  for (const stride of [4, 12, 64, 256])
+    for (const count of [1, 16, 17, 257, 1000])
+      for (const noise of [1, 3, 9, 40, 256]) {
+        const rows = new Uint8Array(stride * count);
+        for (let i = 0; i < rows.length; i++) rows[i] = (rows[i - stride] ?? 7) + random(noise);
+        attributes(rows, count, stride);
+      }
+  const floats = Float32Array.from({ length: 3000 }, () => (random(2001) - 1000) / 2 ** random(20));
+  attributes(MeshoptEncoder.encodeFilterExp(floats, 1000, 12, 15), 1000, 12, 'EXPONENTIAL');
+  const { triangles } = ball(4);
+  const orders = [triangles, triangles.toSorted?.(() => random(3) - 1) ?? [...triangles].reverse()];
+  const lists = [...orders.map((order) => order.flat()), Array.from({ length: 300 }, () => random(2 ** 31))];
+  for (const list of lists)
+    for (const Type of Math.max(...list) < 65536 ? [Uint16Array, Uint32Array] : [Uint32Array]) {
+      const [bytes, count, byteStride] = [bytesOf(Type.from(list)), list.length, Type.BYTES_PER_ELEMENT];
+      const { encodeIndexBuffer, encodeIndexSequence } = MeshoptEncoder;
+      streams.push([{ mode: 'TRIANGLES', count, byteStride }, encodeIndexBuffer(bytes, count, byteStride)]);
+      streams.push([{ mode: 'INDICES', count, byteStride }, encodeIndexSequence(bytes, count, byteStride)]);
+    }
+  for (const [view, bytes] of streams) {
+    const expected = new Uint8Array(view.count * view.byteStride);
+    MeshoptDecoder.decodeGltfBuffer(expected, view.count, view.byteStride, bytes, view.mode, view.filter);
+    assert.ok(Buffer.from(mesh.unpackView(view, bytes)).equals(Buffer.from(expected)), JSON.stringify(view));
+    for (let at = 0; at < bytes.length; at += Math.ceil(bytes.length / 5))
+      assert.throws(() => mesh.unpackView(view, bytes.subarray(0, at)), /damaged/, `${at} bytes`);
+  }
+  assert.throws(() => mesh.unpackView({ mode: 'INDICES', count: 1e9, byteStride: 4 }, streams[0][1]), /damaged/);
 });

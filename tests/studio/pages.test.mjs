@@ -97,6 +97,8 @@ test('the licences of bundled packages are served', async () => {
     'Jason Miller',
     'Inter Project Authors',
     'SIL OPEN FONT LICENSE',
+    'The Draco Authors',
+    'Apache License',
   ])
     assert.ok(text.includes(words), words);
 });

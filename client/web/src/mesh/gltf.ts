@@ -1,4 +1,8 @@
-/** The part of glTF 2.0 that meshes and morphs need: accessors (also sparse and normalised), nodes, targets, images. */
+/**
+ * The part of glTF 2.0 that meshes and morphs need: accessors (also sparse, normalised and compressed), nodes, targets,
+ * images.
+ */
+import { unpackView, type Packed } from './meshopt';
 
 interface Accessor {
   bufferView?: number;
@@ -13,13 +17,16 @@ interface Accessor {
     values: { bufferView: number; byteOffset?: number };
   };
 }
-interface Primitive {
+export interface Primitive {
   mode?: number;
   attributes: Record<string, number>;
   indices?: number;
   material?: number;
   targets?: Record<string, number>[];
-  extensions?: { KHR_materials_variants?: { mappings?: { material: number; variants: number[] }[] } };
+  extensions?: {
+    KHR_materials_variants?: { mappings?: { material: number; variants: number[] }[] };
+    KHR_draco_mesh_compression?: { bufferView: number; attributes: Record<string, number> };
+  };
 }
 interface Node {
   mesh?: number;
@@ -46,9 +53,16 @@ interface Material {
     KHR_materials_pbrSpecularGlossiness?: { diffuseFactor?: number[]; diffuseTexture?: TextureSlot };
   };
 }
+interface BufferView {
+  buffer: number;
+  byteOffset?: number;
+  byteLength: number;
+  byteStride?: number;
+  extensions?: { EXT_meshopt_compression?: Packed };
+}
 interface Document {
   accessors?: Accessor[];
-  bufferViews?: { buffer: number; byteOffset?: number; byteLength: number; byteStride?: number }[];
+  bufferViews?: BufferView[];
   buffers?: { uri?: string; byteLength: number }[];
   meshes?: { primitives: Primitive[]; weights?: number[]; extras?: { targetNames?: string[]; firstShape?: number } }[];
   materials?: Material[];
@@ -98,10 +112,31 @@ function localMatrix(node: Node): number[] {
 }
 
 export class Gltf {
+  private readonly unpacked = new Map<number, Uint8Array>();
+
   constructor(
     readonly json: Document,
     readonly buffers: Uint8Array[],
   ) {}
+
+  /** The bytes of a buffer view, without compression. */
+  view(number: number): Uint8Array {
+    const view = this.json.bufferViews![number];
+    const packed = view.extensions?.EXT_meshopt_compression;
+    const { buffer, byteOffset = 0, byteLength } = packed ?? view;
+    const bytes = this.buffers[buffer].subarray(byteOffset, byteOffset + byteLength);
+    if (!packed) return bytes;
+    const known = this.unpacked.get(number) ?? unpackView(packed, bytes);
+    this.unpacked.set(number, known);
+    return known;
+  }
+
+  /** Adds an accessor with these bytes. Returns its number. */
+  add(bytes: Uint8Array, accessor: Omit<Accessor, 'bufferView'>): number {
+    const buffer = this.buffers.push(bytes) - 1;
+    const bufferView = (this.json.bufferViews ??= []).push({ buffer, byteLength: bytes.length }) - 1;
+    return (this.json.accessors ??= []).push({ ...accessor, bufferView }) - 1;
+  }
 
   private component(view: DataView, at: number, type: number, normalized: boolean): number {
     switch (type) {
@@ -129,11 +164,10 @@ export class Gltf {
     width: number,
     normalized: boolean,
   ) {
-    const view = this.json.bufferViews![bufferView];
-    const bytes = this.buffers[view.buffer];
+    const bytes = this.view(bufferView);
     const size = type === 5120 || type === 5121 ? 1 : type === 5122 || type === 5123 ? 2 : 4;
-    const start = bytes.byteOffset + (view.byteOffset ?? 0) + offset;
-    const stride = view.byteStride ?? size * width;
+    const start = bytes.byteOffset + offset;
+    const stride = this.json.bufferViews![bufferView].byteStride ?? size * width;
     if (stride === size * width && start % size === 0 && !normalized) {
       const View =
         { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array }[type] ??
@@ -196,9 +230,7 @@ export class Gltf {
   image(number: number): Blob {
     const { uri, bufferView, mimeType: type } = this.json.images![number];
     if (uri !== undefined) return new Blob(uri.startsWith('data:') ? [dataUri(uri) as BlobPart] : [], { type });
-    const view = this.json.bufferViews![bufferView!];
-    const start = view.byteOffset ?? 0;
-    return new Blob([this.buffers[view.buffer].slice(start, start + view.byteLength) as BlobPart], { type });
+    return new Blob([this.view(bufferView!) as BlobPart], { type });
   }
 
   /** For each mesh, the matrices of the nodes that show it. */

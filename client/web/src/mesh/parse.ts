@@ -1,8 +1,9 @@
 /**
- * Reads mesh files for display, all but 3MF and compressed glTF, which only the daemon reads. Vertices have the same
- * numbers as in the daemon: OBJ, OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all
- * triangle primitives one after another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
+ * Reads mesh files for display, all but 3MF, which only the daemon reads. Vertices have the same numbers as in the daemon:
+ * OBJ, OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle primitives one after
+ * another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
  */
+import { unpackPrimitives } from './draco';
 import { dressOf, plyDress, tried, type Dress } from './dress';
 import { extrasIn, type Extra } from './extras';
 import { readGlb, type Gltf } from './gltf';
@@ -434,16 +435,28 @@ function drawable(raw: RawMesh): RawMesh {
   return { ...raw, corners: n === corners.length ? corners : corners.slice(0, n) };
 }
 
-/** Detects the format by content, as the daemon does. */
+const headOf = (bytes: Uint8Array) => ascii(bytes, 0, Math.min(512, bytes.length)).trimStart();
+const gltfFormat = (head: string) => (head.startsWith('glTF') ? 'glb' : head.startsWith('{') ? 'gltf' : null);
+
+/** Detects the format by content, as the daemon does. Draco is not decoded: openMesh() does that. */
 export function parseMesh(buffer: ArrayBuffer): RawMesh {
   const bytes = new Uint8Array(buffer);
-  const head = ascii(bytes, 0, Math.min(512, bytes.length)).trimStart();
+  const head = headOf(bytes);
+  const gltf = gltfFormat(head);
+  if (gltf) return drawable(parseGltf(readGlb(buffer), gltf));
   if (head.startsWith('PK')) throw new Error('Only the daemon reads 3MF.');
-  if (head.startsWith('glTF')) return drawable(parseGltf(readGlb(buffer), 'glb'));
   if (head.startsWith('ply')) return drawable(parsePly(bytes));
   if (/^(ST|C|N|4|n)*OFF\b/.test(head)) return drawable(parseOff(bytes));
-  if (head.startsWith('{')) return drawable(parseGltf(readGlb(buffer), 'gltf'));
   if (/^solid/i.test(head) && /facet|endsolid/i.test(head)) return drawable(parseStl(bytes));
   if (/^(#|v|vn|vt|f|o|g|s|mtllib|usemtl)\b/m.test(head)) return drawable(parseObj(bytes));
   return drawable(parseStl(bytes));
+}
+
+/** As parseMesh(), and with Draco's decoder for files that need it. */
+export async function openMesh(buffer: ArrayBuffer): Promise<RawMesh> {
+  const format = gltfFormat(headOf(new Uint8Array(buffer)));
+  if (!format) return parseMesh(buffer);
+  const gltf = readGlb(buffer);
+  await unpackPrimitives(gltf);
+  return drawable(parseGltf(gltf, format));
 }

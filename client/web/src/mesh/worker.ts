@@ -9,7 +9,7 @@ import { decodeSphere, type SphereData } from './distortion';
 import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } from './geometry';
 import { decodeImages } from './dress';
 import { mendedMesh } from './mended';
-import { parseMesh, type RawMesh } from './parse';
+import { openMesh, parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
 import { stretchOf, touched, type Touched } from './linked';
 import { undoFit } from './fit';
@@ -110,7 +110,7 @@ function padded(values: Float32Array, count: number): Float32Array {
 
 const ops = {
   async open(key: string, buffer: ArrayBuffer): Promise<Display> {
-    const raw = parseMesh(buffer);
+    const raw = await openMesh(buffer);
     if (!raw.corners.length) throw new Error('The file has no triangles.');
     const display = buildDisplay(raw);
     held.set(key, { raw, frame: display.frame, added: Infinity, file: raw });
