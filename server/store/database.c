@@ -243,6 +243,16 @@ int database_migrate(database *db) {
               latest);
     return SQL_SCHEMA;
   }
+  if (code == SQL_OK && version > 0 && version < latest) {
+    code = driver->exclude(&db->connection);
+    if (code == SQL_BUSY) {
+      log_error(
+          "the catalogue has the older schema %d, and daemons that need it run: stop them before you start this "
+          "version, which makes it %d",
+          version, latest);
+      return SQL_SCHEMA;
+    }
+  }
   for (; code == SQL_OK && version < latest; version++) {
     code = migrate_to(db, version + 1, steps[version]);
   }

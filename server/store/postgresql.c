@@ -38,6 +38,10 @@ static void close_server(sql_connection *c) {
   c->native = NULL;
 }
 
+static int exclude(sql_connection *c) {
+  return pgsql_exclude(c->native);
+}
+
 static int hold(sql_connection *c) {
   return pgsql_hold(c->native);
 }
@@ -250,6 +254,7 @@ const sql_driver sql_postgresql = {
     .execute = execute,
     .in_transaction = in_transaction,
     .version = version,
+    .exclude = exclude,
     .hold = hold,
     .changes = changes,
     .prepare = prepare,

@@ -57,24 +57,31 @@ static int refuse(pgsql_connection *c, int code, const char *why) {
   return code;
 }
 
-/* Nodes share the lock; the first connection of a node also holds the lock of migrations until pgsql_hold(). */
-static int lock(pgsql_connection *c) {
+static int take_lock(pgsql_connection *c, int shared) {
   char sql[128];
   int64_t locked = 0;
   int code = SQL_OK;
   snprintf(sql, sizeof sql, "SELECT pg_try_advisory_lock%s(%d, hashtext(current_schema()))::int",
-           c->writer == SQL_SHARES ? "_shared" : "", LOCK);
+           shared ? "_shared" : "", LOCK);
   for (int i = 0; i < LOCK_TRIES && code == SQL_OK && !locked; i++) {
     if (i > 0) {
       nanosleep(&(struct timespec){.tv_nsec = LOCK_WAIT_NS}, NULL);
     }
     code = pgsql_run(c, sql, &locked);
   }
-  if (code == SQL_OK && locked && c->writer == SQL_SHARES && c->generation == 1) {
+  return code == SQL_OK && !locked ? refuse(c, SQL_BUSY, "another orbmorphd uses it") : code;
+}
+
+/* Nodes share the lock. The first connection of a node also holds the lock of migrations until pgsql_hold(). It takes
+ * that one first, so that nodes that wait for a migration do not keep it from excluding the nodes that run. */
+static int lock(pgsql_connection *c) {
+  char sql[128];
+  int code = SQL_OK;
+  if (c->writer == SQL_SHARES && c->generation == 1) {
     snprintf(sql, sizeof sql, "SELECT pg_advisory_lock(%d, hashtext(current_schema()))", LOCK_OF_SCHEMA);
     code = pgsql_run(c, sql, NULL);
   }
-  return code == SQL_OK && !locked ? refuse(c, SQL_BUSY, "another orbmorphd uses it") : code;
+  return code == SQL_OK ? take_lock(c, c->writer == SQL_SHARES) : code;
 }
 
 /* Checks that this connection may write here, and that it is the only one. */
@@ -112,6 +119,7 @@ static int begin(pgsql_connection *c) {
                        "SET tcp_keepalives_count=3",
                        NULL);
   c->generation++;
+  c->excludes = 0;
   if (code == SQL_OK && c->writer == SQL_SHARES) { /* other nodes wait for its transaction */
     code = pgsql_run(c, "SET idle_in_transaction_session_timeout='5s'", NULL);
   }
@@ -235,11 +243,23 @@ void pgsql_close(pgsql_connection *c) {
   }
 }
 
-int pgsql_hold(pgsql_connection *to) {
+int pgsql_exclude(pgsql_connection *c) {
+  int code = c->writer == SQL_SHARES ? take_lock(c, 0) : SQL_OK;
+  c->excludes = c->writer == SQL_SHARES && code == SQL_OK;
+  return code;
+}
+
+static int unlock(pgsql_connection *c, int which) {
   char sql[96];
+  snprintf(sql, sizeof sql, "SELECT pg_advisory_unlock(%d, hashtext(current_schema()))", which);
+  return pgsql_run(c, sql, NULL);
+}
+
+int pgsql_hold(pgsql_connection *to) {
   if (to->writer == SQL_SHARES) {
-    snprintf(sql, sizeof sql, "SELECT pg_advisory_unlock(%d, hashtext(current_schema()))", LOCK_OF_SCHEMA);
-    return pgsql_run(to, sql, NULL);
+    int code = to->excludes ? unlock(to, LOCK) : SQL_OK;
+    to->excludes = 0;
+    return code == SQL_OK ? unlock(to, LOCK_OF_SCHEMA) : code;
   }
   return pgsql_run(to, "UPDATE catalogue SET holder=holder+1 RETURNING holder", &to->holder);
 }

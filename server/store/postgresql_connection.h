@@ -12,6 +12,7 @@
 typedef struct pgsql_connection {
   PGconn *server;
   int writer, out_of_memory;
+  int excludes;   /* whether it keeps other nodes out */
   int generation; /* counts connections: statements are prepared again on each */
   int statements; /* counts them, for their names */
   int64_t changes, holder;
@@ -23,7 +24,8 @@ typedef struct pgsql_connection {
 /* writer: see sql_driver.open. *out: the caller closes it, also after a failure; NULL if out of memory. */
 int pgsql_open(const char *where, int writer, pgsql_connection **out);
 void pgsql_close(pgsql_connection *c);
-/* As sql_driver.hold. */
+/* As sql_driver.exclude and sql_driver.hold. */
+int pgsql_exclude(pgsql_connection *c);
 int pgsql_hold(pgsql_connection *c);
 
 /* Runs one or several statements without parameters. *value: the integer in the first row of the last one; NULL: the

@@ -27,7 +27,7 @@ enum sql_code {
   SQL_CANTOPEN,
   SQL_CORRUPT,
   SQL_NOTADB,
-  SQL_SCHEMA,     /* of a newer program */
+  SQL_SCHEMA,     /* of a newer program, or of an older one that runs */
   SQL_UNFINISHED, /* an incomplete copy of another catalogue, see store/move_mark.h */
   SQL_CODES
 };
@@ -58,6 +58,8 @@ typedef struct sql_driver {
   int (*execute)(sql_connection *c, const char *sql); /* any number of statements, without parameters; logs errors */
   int (*in_transaction)(const sql_connection *c);
   int (*version)(sql_connection *c, int *version); /* of the schema; 0: there is none */
+  /* Of the connection that writes: keeps all other daemons out until hold(). SQL_BUSY: another one is connected. */
+  int (*exclude)(sql_connection *c);
   /* Of the connection that writes, once its schema is up to date. */
   int (*hold)(sql_connection *c);
   int64_t (*changes)(const sql_connection *c); /* rows that the last INSERT, UPDATE or DELETE changed */

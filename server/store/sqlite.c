@@ -141,6 +141,11 @@ static int version(sql_connection *c, int *version) {
 }
 
 /* The lock of the data folder ensures that one daemon alone writes. */
+static int exclude(sql_connection *c) {
+  (void)c;
+  return SQL_OK;
+}
+
 static int hold(sql_connection *c) {
   (void)c;
   return SQL_OK;
@@ -154,6 +159,7 @@ const sql_driver sql_sqlite = {
     .execute = execute,
     .in_transaction = in_transaction,
     .version = version,
+    .exclude = exclude,
     .hold = hold,
     .changes = changes,
     .prepare = prepare,

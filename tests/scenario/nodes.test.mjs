@@ -177,6 +177,19 @@ test('the same requests give the same ids and bytes as one daemon on SQLite and 
   assert.deepEqual(results[1], results[0]);
 });
 
+test('a node of a newer version does not start beside older ones', async (t) => {
+  const c = new Cluster(t);
+  const a = await c.node('--role', 'serve');
+  c.sql('UPDATE catalogue SET schema=schema-1'); // as if that node were of an older version
+  const older = c.sql('SELECT schema FROM catalogue');
+  await assert.rejects(c.node('--role', 'serve'), /the daemon did not start: exit 78/);
+  const newer = c.nodes.pop();
+  assert.match(newer.log, /has the older schema \d+, and daemons that need it run/);
+  assert.equal(c.sql('SELECT schema FROM catalogue'), older);
+  assert.equal((await a.upload(newMesh())).status, 201);
+  c.sql('UPDATE catalogue SET schema=schema+1');
+});
+
 /** Clients of haproxy do not miss a node that is killed. */
 async function behindHaproxy(t, [a, b]) {
   const p = await haproxy(
@@ -271,6 +284,9 @@ test('while PostgreSQL is unreachable, requests get 503 and running jobs lose no
   for (const mesh of ids) await a.made('/v1/embeddings', { mesh });
   const { json } = await a.post('/v1/supermeshes', { shapes: ids.map((mesh) => ({ mesh })) });
   await c.runner(json);
+  const file = `/v1/meshes/${ids[0]}/file`;
+  const known = await a.get(file);
+  assert.equal(known.status, 200);
   postgresql('stop');
   const reply = await a.upload(newMesh());
   assertProblem(reply, 503, 'unavailable');
@@ -280,6 +296,9 @@ test('while PostgreSQL is unreachable, requests get 503 and running jobs lose no
     return found.status === 503 && found;
   }, 'it is not ready');
   assert.match(ready.json.detail, /PostgreSQL/);
+  const still = await a.get(file); // from the memory and the cache of the node
+  assert.equal(still.status, 200, still.bytes.toString());
+  assert.ok(still.bytes.equals(known.bytes));
   await until(() => /supermesh job (done|did not succeed)/.test(a.log), 'the job has run', 300);
   postgresql('start');
   await until(async () => (await a.get('/readyz')).status === 200, 'it is ready', 60);

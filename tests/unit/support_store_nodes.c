@@ -7,14 +7,18 @@
 
 const char *const node_names[2] = {"11111111111111111111111111111111", "22222222222222222222222222222222"};
 
-int nodes_setup(void **state) {
+int nodes_new_catalogue(char url[NODES_URL]) {
   static int count;
-  nodes *n = calloc(1, sizeof *n);
   char command[256];
   snprintf(command, sizeof command, "%s shared-%d-%d", getenv("ORB_NEW_CATALOGUE"), (int)getpid(), ++count);
   FILE *out = popen(command, "r");
-  int fine = out && fgets(n->url, sizeof n->url, out);
-  if (!out || pclose(out) != 0 || !fine) {
+  int fine = out && fgets(url, NODES_URL, out);
+  return out && pclose(out) == 0 && fine;
+}
+
+int nodes_setup(void **state) {
+  nodes *n = calloc(1, sizeof *n);
+  if (!nodes_new_catalogue(n->url)) {
     return -1;
   }
   for (int i = 0; i < 2; i++) {

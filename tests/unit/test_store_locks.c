@@ -1,5 +1,6 @@
-/* The lock of objects over several nodes: publishing, excluding, lost connections, announced deletions. Two catalogues
- * on one schema in PostgreSQL stand for two nodes. Runs under tests/tools/with_postgresql.sh. */
+/* Locks over several nodes: that of objects (publishing, excluding, lost connections, announced deletions), and that of
+ * the schema. Several catalogues on one schema in PostgreSQL stand for nodes. Runs under
+ * tests/tools/with_postgresql.sh. */
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,6 +15,7 @@
 
 #include "store/object_lock.h"
 #include "store/owners.h"
+#include "store/postgresql_schema.h"
 #include "store/transactions.h"
 #include "support_store_nodes.h"
 
@@ -191,12 +193,69 @@ static void test_excluding_waits_for_transactions(void **state) {
   object_lock_close(e.lock);
 }
 
+static int schema_of(database *db) {
+  int version = 0;
+  assert_int_equal(db->connection.driver->version(&db->connection, &version), SQL_OK);
+  return version;
+}
+
+typedef struct opener {
+  const char *url;
+  catalogue *cat;
+  store_result result;
+  pthread_t thread;
+} opener;
+
+static void *open_node(void *user) {
+  opener *o = user;
+  o->result = catalogue_open_shared(o->url, 1, &o->cat);
+  return NULL;
+}
+
+/* While a node runs that needs the older schema, a newer node starts neither on it nor migrates it. Once it has ended,
+ * several may start at once, and one of them migrates. */
+static void test_older_schema(void **state) {
+  char url[NODES_URL], mark[64];
+  database old;
+  catalogue *cat = NULL;
+  (void)state;
+  assert_true(nodes_new_catalogue(url));
+  assert_int_equal(database_open(url, SQL_SHARES, &old), SQL_OK);
+  for (int i = 0; i < postgresql_schema - 1; i++) {
+    assert_int_equal(database_execute(&old, postgresql_migrations[i]), SQL_OK);
+  }
+  snprintf(mark, sizeof mark, "UPDATE catalogue SET schema=%d", postgresql_schema - 1);
+  assert_int_equal(database_execute(&old, mark), SQL_OK);
+  assert_int_equal(old.connection.driver->hold(&old.connection), SQL_OK);
+
+  assert_int_equal(catalogue_open_shared(url, 1, &cat), STORE_UNFIT);
+  assert_null(cat);
+  assert_int_equal(schema_of(&old), postgresql_schema - 1);
+  database_close(&old);
+
+  opener openers[3] = {{.url = url}, {.url = url}, {.url = url}};
+  for (int i = 0; i < 3; i++) {
+    assert_int_equal(pthread_create(&openers[i].thread, NULL, open_node, &openers[i]), 0);
+  }
+  for (int i = 0; i < 3; i++) {
+    assert_int_equal(pthread_join(openers[i].thread, NULL), 0);
+    assert_int_equal(openers[i].result, STORE_OK);
+  }
+  database *db = catalogue_reader(openers[0].cat);
+  assert_int_equal(schema_of(db), postgresql_schema);
+  catalogue_reader_done(openers[0].cat, db);
+  for (int i = 0; i < 3; i++) {
+    catalogue_close(openers[i].cat);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_publishing, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_announced_deletion, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_publishing_together, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_excluding_waits_for_transactions, nodes_setup, nodes_teardown),
+      cmocka_unit_test(test_older_schema),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
