@@ -37,8 +37,8 @@ static const double ORB_FIND_BEHIND = 2;
  * which the right match of dan-neutral and dan-twist bent 3.2 times as much as the wrong one. */
 static const double ORB_FIND_OTHER_ABOVE = 1.2, ORB_FIND_OTHER_BEHIND = 4;
 /* The share that the map of the next best match may have of what the best one's bulk is above 1, where it is taken in
- * that one's place. In those rougher registrations the bulk of the right map of that pair had 0.6 to 0.91, by the last bits of
- * the sums; other pairs of people, whose best match was right, had 1.02 to 1.6. */
+ * that one's place. In those rougher registrations the bulk of the right map of that pair had 0.6 to 0.91, by the last
+ * bits of the sums; other pairs of people, whose best match was right, had 1.02 to 1.6. */
 static const double ORB_FIND_OTHER_GAIN = 0.95;
 /* What a match bends the shapes, above which walks are tried before the start from its targets. Of 70 pairs, people in
  * poses bend by 0.02 to 0.15, and the start leads to the better map; other shapes by 0.2 to 0.5, and a walk does. */
