@@ -136,6 +136,9 @@ static void loops(const orb_error *error, api_text *out) {
     api_json_number(out, error->loop_length_relative[i]);
   }
   api_json_close(out, ']');
+  if (error->genus > error->loop_count) {
+    api_json_member_integer(out, "loops_left_out", error->genus - error->loop_count);
+  }
 }
 
 static void topology_facts(const orb_error *error, api_text *out) {

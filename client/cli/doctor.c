@@ -63,10 +63,16 @@ static void list(const cJSON *problem) {
     cli_count(cli_number(item, "triangles"), triangles);
     printf("  part %.0f: %s triangles  %s\n", cli_number(item, "part"), triangles, cli_string(item, "name", ""));
   }
-  int i = 0;
+  const cJSON *length = lengths ? lengths->child : NULL;
   cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(problem, "loops")) {
     printf("  handle: a loop of %d vertices, %.2g of the diagonal, at vertex %.0f\n", cJSON_GetArraySize(item),
-           cJSON_GetNumberValue(cJSON_GetArrayItem(lengths, i++)), cJSON_GetNumberValue(cJSON_GetArrayItem(item, 0)));
+           cJSON_GetNumberValue(length), cJSON_GetNumberValue(cJSON_GetArrayItem(item, 0)));
+    length = length ? length->next : NULL;
+  }
+  if (cJSON_HasObjectItem(problem, "loops_left_out")) {
+    char more[32];
+    cli_count(cli_number(problem, "loops_left_out"), more);
+    printf("  and %s more\n", more);
   }
 }
 

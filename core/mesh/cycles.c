@@ -24,6 +24,10 @@
 
 /* Searches without a limit cover the whole surface: this many vertices in all, and WHOLE_LEAST searches at least. */
 enum { WHOLE_VERTICES = 4000000, WHOLE_LEAST = 8 };
+/* The searches near generators settle so many vertices in all, and each NEAR_LEAST at least: about a second's work at
+ * most, which finds loops of some ten edges. */
+enum { NEAR_VERTICES = 6000000, NEAR_LEAST = 64 };
+enum { GENERATORS_MOST = 16000000 }; /* edges of all generators that are kept beside those searches: 64 MB */
 enum { CHECK_EVERY = 256, SETTLED_EVERY = 65536 }; /* cycles and settled vertices between looks at the deadline */
 
 typedef struct work {
@@ -40,11 +44,11 @@ typedef struct work {
 enum { TREE = 1, COTREE = 2 };
 
 /* The shortest cycle through the seed that does not divide the surface and is shorter than *length: returns the
- * half-edge that closes it and updates *length; −1: there is none. */
-static int32_t search(work *w, int32_t seed, double *length) {
+ * half-edge that closes it and updates *length; −1: there is none. most: vertices to settle. */
+static int32_t search(work *w, int32_t seed, int64_t most, double *length) {
   int32_t closing = -1;
   orb_dijkstra_start(&w->p, seed);
-  for (int64_t settled = 1; w->p.heap_count > 0; settled++) {
+  for (int64_t settled = 1; w->p.heap_count > 0 && settled <= most; settled++) {
     int32_t v = orb_dijkstra_pop(&w->p);
     int late = settled % SETTLED_EVERY == 0 && orb_context_check(w->p.s->ctx) != ORB_OK; /* the caller asks again */
     if (late || 2 * w->p.distance[v] >= *length) {
@@ -92,7 +96,7 @@ static orb_status grow_tree(work *w) {
     do {
       int32_t to = orb_dijkstra_target(&w->p, h);
       if (w->p.state[to] == ORB_DIJKSTRA_UNSEEN) {
-        w->p.state[to] = ORB_DIJKSTRA_SETTLED;
+        w->p.state[to] = ORB_DIJKSTRA_WAITING; /* stays: its path has an edge that is not the file's */
         w->p.distance[to] = w->p.distance[v] + orb_dijkstra_length(&w->p, h);
         w->p.parent[to] = h;
         w->p.walked[to] = 0;
@@ -228,20 +232,40 @@ static orb_status make_room(work *w, int32_t more) {
   return ORB_OK;
 }
 
-/* Keeps the cycle that a half-edge closes with the paths to its ends, without what both paths share. */
-static orb_status keep(work *w, int32_t closing) {
-  int32_t a = orb_dijkstra_origin(&w->p, closing), b = orb_dijkstra_target(&w->p, closing), meet = b, down = 0, up = 0;
-  for (int32_t v = a;; v = orb_dijkstra_origin(&w->p, w->p.parent[v])) {
-    w->p.state[v] = ORB_DIJKSTRA_MARKED;
-    if (w->p.parent[v] < 0) {
-      break;
+/* The vertex before v on its path; −1: v is the seed. */
+static int32_t before(const work *w, int32_t v) {
+  return w->p.parent[v] < 0 ? -1 : orb_dijkstra_origin(&w->p, w->p.parent[v]);
+}
+
+/* Where the paths to two settled vertices meet: takes steps on both by turns, O(the longer way to there). */
+static int32_t meeting_of(work *w, int32_t a, int32_t b) {
+  int32_t at = a, other = b;
+  while (at < 0 || w->p.state[at] != ORB_DIJKSTRA_MARKED) {
+    int32_t next = at;
+    if (at >= 0) {
+      w->p.state[at] = ORB_DIJKSTRA_MARKED;
+      next = before(w, at);
+    }
+    at = other;
+    other = next;
+  }
+  for (int end = 0; end < 2; end++) {
+    for (int32_t v = end ? a : b; v >= 0 && w->p.state[v] == ORB_DIJKSTRA_MARKED; v = before(w, v)) {
+      w->p.state[v] = ORB_DIJKSTRA_SETTLED;
     }
   }
-  for (; w->p.state[meet] != ORB_DIJKSTRA_MARKED; up++) {
-    meet = orb_dijkstra_origin(&w->p, w->p.parent[meet]);
-  }
-  for (int32_t v = a; v != meet; v = orb_dijkstra_origin(&w->p, w->p.parent[v])) {
+  return at;
+}
+
+/* Keeps the cycle that a half-edge closes with the paths to its ends, without what both paths share. */
+static orb_status keep(work *w, int32_t closing) {
+  int32_t a = orb_dijkstra_origin(&w->p, closing), b = orb_dijkstra_target(&w->p, closing), down = 0, up = 0;
+  int32_t meet = meeting_of(w, a, b);
+  for (int32_t v = a; v != meet; v = before(w, v)) {
     down++;
+  }
+  for (int32_t v = b; v != meet; v = before(w, v)) {
+    up++;
   }
   ORB_TRY(make_room(w, down + 1 + up));
   orb_cycle *cycle = &w->found[w->found_count++];
@@ -260,25 +284,15 @@ static orb_status keep(work *w, int32_t closing) {
     cycle->label ^= w->p.label[out[i]];
   }
   w->pool_count += cycle->count;
-  for (int32_t v = a;; v = orb_dijkstra_origin(&w->p, w->p.parent[v])) {
-    w->p.state[v] = ORB_DIJKSTRA_SETTLED;
-    if (w->p.parent[v] < 0) {
-      return ORB_OK;
-    }
-  }
+  return ORB_OK;
 }
 
-/* The cycles of the edges that are left, while the labels of the tree's paths are 0. */
-static orb_status keep_generators(work *w) {
-  for (int32_t i = 0; i < w->left_count; i++) {
-    int usable = orb_dijkstra_is_usable(&w->p, w->left[i]);
-    for (int end = 0; end < 2; end++) {
-      for (int32_t v = end ? orb_dijkstra_origin(&w->p, w->left[i]) : orb_dijkstra_target(&w->p, w->left[i]);
-           usable && w->p.parent[v] >= 0; v = orb_dijkstra_origin(&w->p, w->p.parent[v])) {
-        usable = orb_dijkstra_is_usable(&w->p, w->p.parent[v]);
-      }
-    }
-    if (usable) {
+/* The cycles of the edges that are left, while the labels of the tree's paths are 0, until they have `most` edges. */
+static orb_status keep_generators(work *w, int32_t most) {
+  for (int32_t i = 0; i < w->left_count && w->pool_count < most; i++) {
+    int32_t a = orb_dijkstra_origin(&w->p, w->left[i]), b = orb_dijkstra_target(&w->p, w->left[i]);
+    if (orb_dijkstra_is_usable(&w->p, w->left[i]) && w->p.state[a] == ORB_DIJKSTRA_SETTLED &&
+        w->p.state[b] == ORB_DIJKSTRA_SETTLED) {
       ORB_TRY(keep(w, w->left[i]));
     }
     if (i % CHECK_EVERY == 0) {
@@ -304,22 +318,42 @@ static orb_status list_seeds(work *w) {
   return status;
 }
 
-static orb_status search_seeds(work *w, double limit) {
-  int64_t searches = w->seed_count;
-  if (!isfinite(limit)) {
-    int64_t most = WHOLE_VERTICES / w->p.s->mesh->vertex_count;
-    most = most < WHOLE_LEAST ? WHOLE_LEAST : most;
-    searches = searches < most ? searches : most;
-  }
-  for (int64_t i = 0; i < searches; i++) {
+/* Keeps the cycle that each of `count` seeds finds, which are spread over all. most: vertices of each search. */
+static orb_status search_seeds(work *w, int64_t count, int64_t most, double limit) {
+  for (int64_t i = 0; i < count; i++) {
     double length = limit;
-    int32_t closing = search(w, w->seed[i * w->seed_count / searches], &length);
+    int32_t closing = search(w, w->seed[i * w->seed_count / count], most, &length);
     if (closing >= 0) {
       ORB_TRY(keep(w, closing));
     }
     ORB_TRY(orb_context_check(w->p.s->ctx));
   }
   return ORB_OK;
+}
+
+static orb_status search_within(work *w, double limit) {
+  int64_t searches = w->seed_count;
+  if (!isfinite(limit)) {
+    int64_t most = WHOLE_VERTICES / w->p.s->mesh->vertex_count;
+    most = most < WHOLE_LEAST ? WHOLE_LEAST : most;
+    searches = searches < most ? searches : most;
+  }
+  return search_seeds(w, searches, INT64_MAX, limit);
+}
+
+/* Searches the surroundings of each edge that is left, and of as many other seeds, so that cycles share no vertex. */
+static orb_status search_near(work *w) {
+  int64_t searches = w->left_count < w->seed_count ? w->left_count : w->seed_count, most = NEAR_VERTICES;
+  most = searches > 0 ? most / searches : most;
+  most = most < NEAR_LEAST ? NEAR_LEAST : most;
+  ORB_TRY(search_seeds(w, searches, most, INFINITY));
+  w->seed_count = 0;
+  for (int32_t i = 0; i < w->left_count && w->seed_count < searches; i++) {
+    if (orb_dijkstra_is_usable(&w->p, w->left[i])) {
+      w->seed[w->seed_count++] = orb_dijkstra_origin(&w->p, w->left[i]);
+    }
+  }
+  return search_seeds(w, w->seed_count, most, INFINITY);
 }
 
 /* Adds a label to a basis of labels unless it depends on them. */
@@ -346,8 +380,9 @@ static int is_free(const work *w, const orb_cycle *cycle, const unsigned char *t
   return 1;
 }
 
-/* Chooses, shortest first, and moves the result to `out`. Labels have 64 bits, so 64 cycles are chosen at most. */
-static orb_status choose(work *w, int32_t most, orb_cycles *out) {
+/* Chooses cycles that share no vertex, shortest first, and moves the result to `out`. independent: only those whose
+ * labels are, which have 64 bits, so that 64 cycles are chosen at most. */
+static orb_status choose(work *w, int32_t most, int independent, orb_cycles *out) {
   orb_context *ctx = w->p.s->ctx;
   uint64_t basis[64] = {0};
   unsigned char *taken = ORB_NEW0(ctx, unsigned char, w->p.s->mesh->vertex_count);
@@ -367,7 +402,7 @@ static orb_status choose(work *w, int32_t most, orb_cycles *out) {
   orb_sort_u64(order, w->found_count);
   for (int32_t i = 0; i < w->found_count && out->count < most; i++) {
     const orb_cycle *cycle = &w->found[(uint32_t)order[i]];
-    if (is_free(w, cycle, taken) && is_independent(basis, cycle->label)) {
+    if (is_free(w, cycle, taken) && (!independent || is_independent(basis, cycle->label))) {
       out->cycle[out->count++] = *cycle;
       for (int32_t k = 0; k < cycle->count; k++) {
         taken[orb_dijkstra_origin(&w->p, w->pool[cycle->start + k])] = 1;
@@ -381,27 +416,58 @@ static orb_status choose(work *w, int32_t most, orb_cycles *out) {
   return ORB_OK;
 }
 
+static orb_status open_work(work *w, orb_surface *s, orb_cycles *out) {
+  *out = (orb_cycles){0};
+  ORB_TRY(orb_dijkstra_open(&w->p, s));
+  w->in = ORB_NEW0(s->ctx, unsigned char, 3 * (size_t)s->mesh->triangle_count);
+  return w->in ? find_labels(w) : ORB_E_NO_MEMORY;
+}
+
+static void close_work(work *w) {
+  orb_context *ctx = w->p.s->ctx;
+  orb_dijkstra_close(&w->p);
+  orb_free(ctx, w->in);
+  orb_free(ctx, w->seed);
+  orb_free(ctx, w->left);
+  orb_free(ctx, w->found);
+  orb_free(ctx, w->pool);
+}
+
 orb_status orb_cycles_find(orb_surface *s, double limit, int32_t most, orb_cycles *out) {
   work w = {0};
-  *out = (orb_cycles){0};
-  orb_status status;
-  ORB_GO(status, orb_dijkstra_open(&w.p, s), done);
-  w.in = ORB_NEW0(s->ctx, unsigned char, 3 * (size_t)s->mesh->triangle_count);
-  ORB_GO(status, w.in ? ORB_OK : ORB_E_NO_MEMORY, done);
-  ORB_GO(status, find_labels(&w), done);
-  if (!isfinite(limit)) {
-    ORB_GO(status, keep_generators(&w), done);
+  orb_status status = open_work(&w, s, out);
+  if (status == ORB_OK && !isfinite(limit)) {
+    status = keep_generators(&w, INT32_MAX);
   }
-  ORB_GO(status, list_seeds(&w), done);
-  ORB_GO(status, search_seeds(&w, limit), done);
-  status = choose(&w, most, out);
-done:
-  orb_dijkstra_close(&w.p);
-  orb_free(s->ctx, w.in);
-  orb_free(s->ctx, w.seed);
-  orb_free(s->ctx, w.left);
-  orb_free(s->ctx, w.found);
-  orb_free(s->ctx, w.pool);
+  if (status == ORB_OK) {
+    status = list_seeds(&w);
+  }
+  if (status == ORB_OK) {
+    status = search_within(&w, limit);
+  }
+  if (status == ORB_OK) {
+    status = choose(&w, most, 1, out);
+  }
+  close_work(&w);
+  return status;
+}
+
+orb_status orb_cycles_generate(orb_surface *s, orb_cycles *out) {
+  work w = {0};
+  orb_status status = open_work(&w, s, out);
+  if (status == ORB_OK) {
+    status = keep_generators(&w, GENERATORS_MOST);
+  }
+  if (status == ORB_OK) {
+    status = list_seeds(&w);
+  }
+  if (status == ORB_OK) {
+    status = search_near(&w);
+  }
+  if (status == ORB_OK) {
+    status = choose(&w, INT32_MAX, 0, out);
+  }
+  close_work(&w);
   return status;
 }
 

@@ -25,6 +25,12 @@ typedef struct orb_cycles {
  * O(F log F), and for each vertex of O(√F · genus) seeds a search within limit / 2; with no limit, a few whole
  * searches. */
 ORB_MUST_CHECK orb_status orb_cycles_find(orb_surface *surface, double limit, int32_t most, orb_cycles *out);
+
+/* Finds as many cycles of any length as share no vertex, shortest first, among those of generators and of searches near
+ * them. Each leaves the surface connected; orb_cycles_apart() keeps those that do so together. O(F log F + their total
+ * length). */
+ORB_MUST_CHECK orb_status orb_cycles_generate(orb_surface *surface, orb_cycles *out);
+
 void orb_cycles_free(orb_context *ctx, orb_cycles *cycles);
 
 #endif

@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "base/grow.h"
 #include "base/memory.h"
+#include "mesh/apart.h"
 #include "mesh/cycles.h"
 #include "mesh/edit.h"
 #include "mesh/fill.h"
@@ -27,6 +28,9 @@
 static const double FIRST_LIMIT = 0.125;
 /* Rounds in which loops are searched that an error shows; each costs some searches of the whole surface. */
 enum { LIST_ROUNDS = 24 };
+/* A round of whole searches finds 64 loops at most. Of more handles than this, each round finds as many
+ * short ones as share no vertex; plates, lattices and balls with tubes took one to seven rounds. */
+enum { FEW_HANDLES = 1000, MANY_ROUNDS = 8 };
 
 void orb_loops_free(orb_context *ctx, orb_loops *loops) {
   orb_free(ctx, loops->loop);
@@ -92,10 +96,22 @@ static int is_tunnel(const orb_surface *s, const int32_t *loop, int32_t count, d
 /* Appends a loop in the file's numbers. */
 static orb_status note_loop(orb_surface *s, const orb_cycles *cycles, int32_t i, double diagonal, orb_loops *out) {
   const orb_cycle *cycle = &cycles->cycle[i];
-  if (cycle->count > INT32_MAX - out->vertex_count ||
-      !orb_regrow(s->ctx, &out->loop, (size_t)out->count + 1, sizeof *out->loop) ||
-      !orb_regrow(s->ctx, &out->vertices, (size_t)out->vertex_count + (size_t)cycle->count, sizeof(int32_t))) {
+  if (cycle->count > INT32_MAX / 2 - out->vertex_count) {
     return ORB_E_NO_MEMORY;
+  }
+  if (out->count == out->room) {
+    int32_t room = 2 * out->room + 8;
+    if (!orb_regrow(s->ctx, &out->loop, (size_t)room, sizeof *out->loop)) {
+      return ORB_E_NO_MEMORY;
+    }
+    out->room = room;
+  }
+  if (cycle->count > out->vertex_room - out->vertex_count) {
+    int32_t room = 2 * (out->vertex_count + cycle->count);
+    if (!orb_regrow(s->ctx, &out->vertices, (size_t)room, sizeof *out->vertices)) {
+      return ORB_E_NO_MEMORY;
+    }
+    out->vertex_room = room;
   }
   out->loop[out->count++] =
       (orb_handle){.start = out->vertex_count, .count = cycle->count, .length_relative = cycle->length / diagonal};
@@ -234,33 +250,49 @@ static orb_status names_twice(orb_surface *s, const orb_loops *loops, int *twice
   return ORB_OK;
 }
 
+/* Lists the loops of some cycles, and cuts along them if handles are left. A cycle that names a vertex twice is
+ * dropped: another round may find a better one for its handle. *genus: what is left. */
+static orb_status list_round(orb_surface *s, orb_cycles *cycles, double diagonal, int64_t *genus, orb_loops *out) {
+  int32_t kept = 0;
+  for (int32_t i = 0; i < cycles->count; i++) {
+    int twice = 0;
+    ORB_TRY(note_loop(s, cycles, i, diagonal, out));
+    ORB_TRY(names_twice(s, out, &twice));
+    if (twice) {
+      out->vertex_count = out->loop[--out->count].start;
+    } else {
+      cycles->cycle[kept++] = cycles->cycle[i];
+    }
+  }
+  cycles->count = kept;
+  *genus -= kept;
+  if (kept == 0 || *genus <= 0) {
+    return ORB_OK;
+  }
+  double *area = ORB_NEW(s->ctx, double, kept);
+  orb_status status = area ? cut(s, cycles, 1, area) : ORB_E_NO_MEMORY;
+  orb_free(s->ctx, area);
+  return status;
+}
+
 orb_status orb_surface_list_handles(orb_surface *s, int64_t genus, orb_loops *out) {
-  double facing, diagonal = diagonal_of(s->mesh, &facing), area[64];
-  int32_t most = genus > ORB_ERROR_LOOPS ? ORB_ERROR_ITEMS : ORB_ERROR_LOOPS; /* a part need not cost more */
-  for (int round = 0; round < LIST_ROUNDS && genus > 0 && out->count < most; round++) {
+  double facing, diagonal = diagonal_of(s->mesh, &facing);
+  int many = genus > FEW_HANDLES, rounds = many ? MANY_ROUNDS : LIST_ROUNDS;
+  for (int round = 0; round < rounds && genus > 0; round++) {
     orb_cycles cycles = {0};
-    orb_status status = orb_cycles_find(s, INFINITY, 64, &cycles);
-    for (int32_t i = 0; i < cycles.count && status == ORB_OK; i++) {
-      int twice = 0;
-      status = note_loop(s, &cycles, i, diagonal, out);
-      if (status == ORB_OK) {
-        status = names_twice(s, out, &twice);
-      }
-      if (twice) {
-        out->vertex_count = out->loop[--out->count].start;
-      }
+    orb_status status = many ? orb_cycles_generate(s, &cycles) : orb_cycles_find(s, INFINITY, 64, &cycles);
+    if (status == ORB_OK && many) {
+      status = orb_cycles_apart(s, &cycles);
+    }
+    if (status == ORB_OK) {
+      status = list_round(s, &cycles, diagonal, &genus, out);
     }
     int32_t count = cycles.count;
-    genus -= count;
-    if (status == ORB_OK && count > 0 && genus > 0) {
-      status = cut(s, &cycles, 1, area);
-    }
     orb_cycles_free(s->ctx, &cycles);
     ORB_TRY(status);
     if (count == 0) {
       break;
     }
   }
-  out->count = out->count < most ? out->count : most;
   return ORB_OK;
 }

@@ -8,7 +8,7 @@
 typedef struct orb_loops {
   orb_handle *loop;
   int32_t *vertices;
-  int32_t count, vertex_count;
+  int32_t count, vertex_count, room, vertex_room;
 } orb_loops;
 void orb_loops_free(orb_context *ctx, orb_loops *loops);
 
@@ -18,8 +18,8 @@ void orb_loops_free(orb_context *ctx, orb_loops *loops);
 ORB_MUST_CHECK orb_status orb_surface_close_handles(orb_surface *surface, double size, int64_t *genus);
 
 /* Finds a loop for each handle: closed, each vertex once, along edges of the file, and such that a cut along it leaves
- * the surface connected, which proves that it is not contractible. Of more than ORB_ERROR_LOOPS handles, only
- * ORB_ERROR_ITEMS get one. Cuts the surface, which the caller can only free afterwards. */
+ * the surface connected, which proves that it is not contractible. A handle has none only if no round finds one that
+ * names each vertex once. O(F log F) for each round. Cuts the surface, which the caller can only free afterwards. */
 ORB_MUST_CHECK orb_status orb_surface_list_handles(orb_surface *surface, int64_t genus, orb_loops *out);
 
 #endif

@@ -13,6 +13,7 @@
 #include "api/ids.h"
 #include "api/json.h"
 #include "api/mesh_codec.h"
+#include "api/problem.h"
 #include "api/routes.h"
 #include "api/supermesh_codec.h"
 
@@ -319,6 +320,32 @@ static void test_formatted(void **state) {
   }
 }
 
+/* A refusal for handles says how many loops it leaves out, and nothing where it has all. */
+static void test_loops_left_out(void **state) {
+  (void)state;
+  orb_error *error = calloc(1, sizeof *error);
+  error->status = ORB_E_NOT_GENUS_ZERO;
+  error->line = error->offset = error->boundary_loops = -1;
+  error->shape = error->transfer = -1;
+  error->loop_count = 2;
+  error->loop_start[1] = 3;
+  error->loop_start[2] = 6;
+  for (int i = 0; i < 6; i++) {
+    error->loop_vertices[i] = i;
+  }
+  error->loop_length_relative[0] = error->loop_length_relative[1] = 0.5;
+  for (int more = 0; more < 2; more++) {
+    error->genus = more ? 40000 : 2;
+    api_problem problem = {0};
+    api_problem_of_error(error, &problem);
+    assert_non_null(strstr(problem.facts.data, "\"loops\":[[0,1,2],[3,4,5]]"));
+    const char *left_out = strstr(problem.facts.data, "\"loops_left_out\":39998");
+    assert_true(more ? left_out != NULL : !strstr(problem.facts.data, "left_out"));
+    api_problem_free(&problem);
+  }
+  free(error);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_instants),
                                      cmocka_unit_test(test_integers),
@@ -331,6 +358,7 @@ int main(void) {
                                      cmocka_unit_test(test_repairs),
                                      cmocka_unit_test(test_supermesh_requests),
                                      cmocka_unit_test(test_stored_meshes),
-                                     cmocka_unit_test(test_routes)};
+                                     cmocka_unit_test(test_routes),
+                                     cmocka_unit_test(test_loops_left_out)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -303,7 +303,7 @@ static void test_refused(void **state) {
     orb_mesh ring = torus(24, 1);
     check_refused(&ring, i ? &close : &safe, 1);
     size_t size;
-    static const int holes[] = {1, 3, 5, 60, ORB_ERROR_LOOPS};
+    static const int holes[] = {1, 3, 5, 60, 1000};
     for (int k = 0; k < (i ? 4 : 5); k++) {
       char *text = handles_plate(holes[k], &size);
       orb_mesh plate = read_text(text, size);
@@ -311,6 +311,111 @@ static void test_refused(void **state) {
     }
   }
   assert_non_null(strstr(orb_context_error(ctx)->detail, "handle_size"));
+}
+
+/* What the loops of one mesh are checked with: half-edges by the vertex they leave, and the numbers of the last loop
+ * and walk that passed a vertex and a face. */
+typedef struct many {
+  const orb_mesh *raw;
+  int32_t *twin, *first, *list, *next, *vertex_loop, *face_loop, *queue;
+} many;
+
+static many many_open(const orb_mesh *raw) {
+  size_t v = (size_t)raw->vertex_count, f = (size_t)raw->triangle_count;
+  many m = {raw,
+            calloc(3 * f, sizeof(int32_t)),
+            calloc(v + 2, sizeof(int32_t)),
+            calloc(3 * f, sizeof(int32_t)),
+            calloc(v, sizeof(int32_t)),
+            calloc(v, sizeof(int32_t)),
+            calloc(f, sizeof(int32_t)),
+            calloc(f, sizeof(int32_t))};
+  assert_int_equal(orb_mesh_twins(ctx, raw->triangles, raw->triangle_count, raw->vertex_count, m.twin), ORB_OK);
+  for (int32_t h = 0; h < 3 * raw->triangle_count; h++) {
+    m.first[raw->triangles[h] + 2]++;
+  }
+  for (int32_t i = 0; i < raw->vertex_count; i++) {
+    m.first[i + 2] += m.first[i + 1];
+  }
+  for (int32_t h = 0; h < 3 * raw->triangle_count; h++) {
+    m.list[m.first[raw->triangles[h] + 1]++] = h;
+  }
+  return m;
+}
+
+static void many_close(many *m) {
+  int32_t *blocks[] = {m->twin, m->first, m->list, m->next, m->vertex_loop, m->face_loop, m->queue};
+  for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
+    free(blocks[i]);
+  }
+}
+
+/* As check_loop(), but stops where a walk over faces from the left of the loop's first edge, which does not cross the
+ * loop, arrives on the right: with very many loops, each is checked near its handle. number: 1 for the first loop. */
+static void check_near(many *m, const int32_t *loop, int count, int32_t number) {
+  int32_t start = -1, head = 0, tail = 0;
+  assert_true(count >= 3);
+  for (int i = 0; i < count; i++) {
+    assert_in_range(loop[i], 0, m->raw->vertex_count - 1);
+    assert_int_not_equal(m->vertex_loop[loop[i]], number);
+    m->vertex_loop[loop[i]] = number;
+    m->next[loop[i]] = loop[(i + 1) % count];
+  }
+  for (int i = 0; i < count; i++) {
+    int found = 0;
+    for (int32_t k = m->first[loop[i]]; k < m->first[loop[i] + 1]; k++) {
+      if (m->raw->triangles[orb_next(m->list[k])] == m->next[loop[i]]) {
+        found++;
+        start = m->list[k];
+      }
+    }
+    assert_int_equal(found, 1);
+  }
+  m->queue[tail++] = start / 3;
+  m->face_loop[start / 3] = number;
+  while (head < tail && m->face_loop[m->twin[start] / 3] != number) {
+    int32_t t = m->queue[head++];
+    for (int32_t h = 3 * t; h < 3 * t + 3; h++) {
+      int32_t a = m->raw->triangles[h], b = m->raw->triangles[orb_next(h)], g = m->twin[h] / 3;
+      int on_loop = m->vertex_loop[a] == number && m->vertex_loop[b] == number && (m->next[a] == b || m->next[b] == a);
+      if (!on_loop && m->face_loop[g] != number) {
+        m->face_loop[g] = number;
+        m->queue[tail++] = g;
+      }
+    }
+  }
+  assert_int_equal(m->face_loop[m->twin[start] / 3], number);
+}
+
+/* Thousands of handles: each has a loop. */
+static void test_many(void **state) {
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    const orb_repair_options options = {.repair = i ? ORB_REPAIR_CLOSE_HANDLES : ORB_REPAIR_SAFE,
+                                        .handle_size = 1e-9 * i};
+    size_t size;
+    int holes = i ? 1001 : 5000;
+    char *text = handles_plate(holes, &size);
+    orb_mesh plate = read_text(text, size), raw;
+    assert_int_equal(orb_mesh_copy(ctx, &plate, &raw), ORB_OK);
+    clock_t start = clock();
+    assert_int_equal(orb_mesh_repair_with(ctx, &plate, &options), ORB_E_NOT_GENUS_ZERO);
+    print_message("%d handles, %d triangles: %.2f s\n", holes, raw.triangle_count,
+                  (double)(clock() - start) / CLOCKS_PER_SEC);
+    const orb_error *error = orb_context_error(ctx);
+    assert_int_equal(error->genus, holes);
+    assert_int_equal(error->loop_count, holes);
+    many m = many_open(&raw);
+    for (int k = 0; k < holes; k++) {
+      check_near(&m, error->loop_vertices + error->loop_start[k], error->loop_start[k + 1] - error->loop_start[k],
+                 k + 1);
+    }
+    /* the holes are squares of edge 1 and no bar is thicker, so loops of length 4 are there: few are much longer */
+    assert_true(error->loop_start[holes] <= 5 * holes);
+    many_close(&m);
+    orb_mesh_free(ctx, &raw);
+    orb_mesh_free(ctx, &plate);
+  }
 }
 
 /* The shortest loop of a torus goes around its tube, and is cut where it is allowed. The caps of a tube of n sides have
@@ -384,9 +489,9 @@ static void test_memory(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals),
-                                     cmocka_unit_test(test_refused), cmocka_unit_test(test_torus),
-                                     cmocka_unit_test(test_mixed),   cmocka_unit_test(test_memory),
-                                     cmocka_unit_test(test_scans),   cmocka_unit_test(test_real_refused)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals), cmocka_unit_test(test_refused),
+      cmocka_unit_test(test_torus),   cmocka_unit_test(test_many),    cmocka_unit_test(test_mixed),
+      cmocka_unit_test(test_memory),  cmocka_unit_test(test_scans),   cmocka_unit_test(test_real_refused)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -1124,10 +1124,12 @@ export type ProblemNotGenusZero = {
   /** What is wrong and what to do. */
   detail: string;
   genus: number;
-  /** A loop for each handle, or for a hundred of them if there are more than 1000: vertices of the file, each once, joined by edges; the last is joined to the first. A cut along it leaves the surface in one piece. */
+  /** A loop for each handle, up to 32768 loops and 262144 vertices in all: vertices of the file, each once, joined by edges; the last is joined to the first. A cut along it leaves the surface in one piece. */
   loops: number[][];
   /** The length of each loop, relative to the diagonal. */
   loop_lengths_relative: number[];
+  /** The number of handles whose loops are not in the list. Absent: the list has all. */
+  loops_left_out?: number;
 };
 
 export type ProblemDegenerate = {

@@ -19,7 +19,7 @@ extern "C" {
 
 typedef struct orb_context orb_context;
 
-enum { ORB_ERROR_ITEMS = 100, ORB_ERROR_LOOPS = 1000, ORB_ERROR_LOOP_VERTICES = 65536 };
+enum { ORB_ERROR_ITEMS = 100, ORB_ERROR_LOOPS = 32768, ORB_ERROR_LOOP_VERTICES = 262144 };
 
 /* A part of a glTF document. */
 typedef struct orb_error_element {
@@ -50,7 +50,8 @@ typedef struct orb_error {
   int64_t element_total; /* offending parts of the shape's glTF document; `elements` holds the first of them */
   int32_t element_count;
   orb_error_element elements[ORB_ERROR_ITEMS];
-  /* not-genus-zero: closed walks along edges of the file. Each handle has one, until the arrays are full. Loop i has
+  /* not-genus-zero: closed walks along edges of the file. Each handle has one, until the arrays are full; genus −
+   * loop_count handles have none. Loop i has
    * the vertices loop_vertices[loop_start[i]] … loop_vertices[loop_start[i + 1] − 1], each once. */
   int32_t loop_count, loop_start[ORB_ERROR_LOOPS + 1];
   double loop_length_relative[ORB_ERROR_LOOPS]; /* to the diagonal */

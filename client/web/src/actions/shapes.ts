@@ -201,7 +201,7 @@ const CLOSE = 'close_handles';
 /** The daemon's own limit of a handle that it closes, and the largest limit that it takes: relative to the diagonal. */
 const SMALL = 0.05;
 const LARGEST = 10;
-/** A refusal with very many handles shows some of their loops, and a cut can lengthen others: each round allows the longest of those left. */
+/** A refusal with tens of thousands of handles may leave loops out, and a cut can lengthen others: each round allows the longest of those left. */
 const ROUNDS = 8;
 
 /** Closes the handles that are left after a repair with this `size`. */
