@@ -53,20 +53,34 @@ function nearestFace(point, faces) {
   return nearest;
 }
 
+const unit = (x) => x.map((c) => c / Math.hypot(...x));
+const sumOf = (vectors) => [0, 1, 2].map((k) => vectors.reduce((sum, x) => sum + x[k], 0));
+
+/** The normals of a surface at its corners, by position: sums over the faces there, by area. */
+function smoothNormalsOf(faces) {
+  const normals = new Map();
+  for (const face of faces) {
+    for (const corner of face) normals.set(`${corner}`, sumOf([normals.get(`${corner}`) ?? [0, 0, 0], normalOf(face)]));
+  }
+  return normals;
+}
+
+/** The smooth normal of a surface at a point on it. */
+function smoothNormalAt(point, faces, normals) {
+  const face = nearestFace(point, faces);
+  const whole = Math.hypot(...normalOf(face));
+  const shares = [0, 1, 2].map((k) => Math.hypot(...normalOf([point, face[(k + 1) % 3], face[(k + 2) % 3]])) / whole);
+  return unit(sumOf(face.map((corner, k) => unit(normals.get(`${corner}`)).map((x) => x * shares[k]))));
+}
+
 /**
  * The cosine between a triangle and the surface at its corners, which lie on it. The centre may be far from the surface,
- * and nearest to a part of it on which the triangle does not lie.
+ * and nearest to a part of it on which the triangle does not lie; and beside an edge, a flat face tells one side only.
  */
-function facingOf(triangle, faces) {
-  const sum = [0, 0, 0];
-  for (const corner of triangle) {
-    const normal = normalOf(nearestFace(corner, faces));
-    normal.forEach((x, k) => {
-      sum[k] += x / Math.hypot(...normal);
-    });
-  }
+function facingOf(triangle, faces, normals) {
+  const smooth = sumOf(triangle.map((corner) => smoothNormalAt(corner, faces, normals)));
   const normal = normalOf(triangle);
-  return normal.reduce((total, x, k) => total + x * sum[k], 0) / (Math.hypot(...normal) * Math.hypot(...sum));
+  return normal.reduce((total, x, k) => total + x * smooth[k], 0) / (Math.hypot(...normal) * Math.hypot(...smooth));
 }
 
 /** That the inverted triangles of a pair are counted, and the largest named by their numbers in the file. Returns how many. */
@@ -77,10 +91,10 @@ function assertNamed({ a, b, inverted_fraction, inverted_count, inverted_triangl
   const places = [a, b].map((s) => pointsOf(morph, s));
   const faces = [a, b].map((s) => facesOf(sources[s]));
   const shown = inverted_triangles.map((t) => places.map((points) => sources[0].triangles[t].map((v) => points[v])));
-  // The others face their surface with a cosine near 1. At an edge, the face beside a corner may be the other one.
-  const facing = shown.map((pair) => Math.min(...pair.map((triangle, i) => facingOf(triangle, faces[i]))));
-  assert.ok(Math.max(-1, ...facing) < 0.25, `${facing}`);
-  assert.ok(facing.filter((x) => x < 0).length >= 0.8 * facing.length, `${facing}`);
+  const normals = faces.map(smoothNormalsOf);
+  const facing = shown.map((pair) => Math.min(...pair.map((triangle, i) => facingOf(triangle, faces[i], normals[i]))));
+  // The others face their surface with a cosine near 1. The daemon weighs normals by its own rule, hence the margin.
+  assert.ok(Math.max(-1, ...facing) < 0.05, `${facing}`);
   const sizes = shown.map((pair) => Math.max(...pair.map((triangle) => Math.hypot(...normalOf(triangle)))));
   assert.ok(
     sizes.every((x, i) => i === 0 || x <= 1.001 * sizes[i - 1]),

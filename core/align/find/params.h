@@ -40,9 +40,9 @@ static const double ORB_FIND_OTHER_ABOVE = 1.2, ORB_FIND_OTHER_BEHIND = 4;
  * that one's place. In those rougher registrations the bulk of the right map of that pair had 0.6 to 0.91, by the last
  * bits of the sums; other pairs of people, whose best match was right, had 1.02 to 1.6. */
 static const double ORB_FIND_OTHER_GAIN = 0.95;
-/* What a match bends the shapes, above which walks are tried before the start from its targets. Of 70 pairs, people in
- * poses bend by 0.02 to 0.15, and the start leads to the better map; other shapes by 0.2 to 0.5, and a walk does. */
-static const double ORB_FIND_WALKS_FIRST = 0.2;
+/* What a match bends the shapes, above which walks are tried before the start from its targets. People in poses bend by
+ * 0.02 to 0.13, and the start leads to the better map; other shapes bend by 0.16 to 0.5, and a walk does. */
+static const double ORB_FIND_WALKS_FIRST = 0.15;
 /* The mean energy of the maps of several matches above which their pairs are pinned. From when two shapes were pinned
  * as well: three such pairs came to 1.9, 2.2 and 4.4 in 10 s. */
 static const double ORB_FIND_PINS_ABOVE = 2.5;
