@@ -148,6 +148,7 @@ test('a job that crashes the service three times fails, and the queue goes on', 
     while (now.state === 'queued' || now.stage === null);
     assert.equal(now.state, 'running', JSON.stringify(now));
     assert.equal(now.attempt, crash);
+    await sleep(500); // an event is stored at most 20 ms after it happens, and a commit
     await kill(d);
   }
   const end = (await d.get(poison.url)).json;
