@@ -7,7 +7,6 @@
 #include <cmocka.h>
 
 #include "align/find/match.h"
-#include "align/find/params.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "align/sheet/even.h"
@@ -58,7 +57,6 @@ static void dog_to_giraffe(void **state) {
   orb_even_shapes_free(ctx, &even);
   assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
   const double *targets[2] = {NULL, match.target};
-  assert_true(match.bend > ORB_FIND_WALKS_FIRST);
   const orb_aims aims = {.targets = targets, .keep_angles = 1, .walks_first = 1};
   assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_SPACE, &aims, ORB_PRESET_DEFAULT), ORB_OK);
   assert_true(alignment.energy <= orb_map_params_of(ORB_PRESET_DEFAULT).energy.poor);
