@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "spectral/cost.h"
 
 enum { ORDERS = 14, SIGNS = 1 << (ORB_ZOOM_START - 1), STARTS = ORDERS * SIGNS };
@@ -186,6 +187,21 @@ static orb_status write_dense(search *s, int32_t most, const orb_mesh *a, const 
   return ORB_OK;
 }
 
+typedef struct shape_job {
+  search *s;
+  const orb_mesh *mesh[2];
+  int mirrored;
+  orb_status status[2];
+} shape_job;
+
+static void create_shapes(void *arg, int64_t begin, int64_t end, int thread) {
+  shape_job *job = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    job->status[i] = orb_spectral_shape_create(job->s->ctx, job->mesh[i], i == 1 && job->mirrored, &job->s->shape[i]);
+  }
+}
+
 static orb_status find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored, int32_t most,
                        orb_spectral_list *out, orb_spectral_dense *dense) {
   orb_status status;
@@ -195,8 +211,10 @@ static orb_status find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, i
     return ORB_E_NO_MEMORY;
   }
   s->ctx = ctx;
-  ORB_GO(status, orb_spectral_shape_create(ctx, a, 0, &s->shape[0]), end);
-  ORB_GO(status, orb_spectral_shape_create(ctx, b, mirrored, &s->shape[1]), end);
+  shape_job job = {s, {a, b}, mirrored, {ORB_OK, ORB_OK}};
+  orb_parallel_for(ctx, 2, 1, create_shapes, &job);
+  ORB_GO(status, job.status[0], end);
+  ORB_GO(status, job.status[1], end);
   if (s->shape[0].is_usable && s->shape[1].is_usable) {
     ORB_GO(status, run(s, out), end);
     if (dense) {

@@ -354,7 +354,6 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   ORB_GO(status, orb_map_pairs_create(&c), done);
   if (guide->target && c.pairs.landmarks > 0) {
     energy[0] = energy[1] = c.best_energy = INFINITY; /* the landmarks are apart */
-    c.pairs.count = c.pairs.landmarks;                /* mirror landmarks would hold what the targets know better */
   }
   if (guide->from == ORB_MAP_FROM_PINS) {
     ORB_GO(status, let_go(&c), done);

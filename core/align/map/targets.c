@@ -35,7 +35,7 @@ static double good_energy(const orb_map_run *c) {
 /* Up to which a map from a start is not improved: landmarks hold crumples that others lose, and a map with them is then
  * worth more time. */
 static double smooth_energy(const orb_map_run *c) {
-  return c->pairs.landmarks > 0 ? c->params.targets.alike : good_energy(c);
+  return c->pairs.landmarks > 0 && !c->keeps_angles ? c->params.targets.alike : good_energy(c);
 }
 
 /* Spatial targets from a registration through samples of the given ones. These come from decimated copies, and are

@@ -14,37 +14,82 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
+/* The sum of the bounded cotangents across an edge. */
+typedef struct smooth_edge {
+  double weight;
+  int32_t end;
+} smooth_edge;
+
 typedef struct smoothing {
   orb_map_level *level;
   const orb_map_params *params;
-  double *target; /* 3 a vertex: where it was placed, on the sphere */
-  double *trust;  /* 0 to 1 */
-  double *smooth; /* likewise: 0 for outliers, else how long a vertex has been without flips */
+  double *target;    /* 3 a vertex: where it was placed, on the sphere */
+  double *trust;     /* 0 to 1 */
+  double *smooth;    /* likewise: 0 for outliers, else how long a vertex has been without flips */
+  double *point;     /* 4 a vertex, the last unused: where it is now */
+  int32_t *row;      /* of the i-th vertex of by_colour: its first edge */
+  smooth_edge *edge; /* to the neighbours, in that order */
 } smoothing;
+
+/* Vertices of one colour do not depend on each other, so their steps overlap in the processor. */
+static int32_t moving_count(const orb_map_level *l) {
+  return l->colour_start[l->colours];
+}
 
 static double bounded(const smoothing *s, double cotangent) {
   return fmin(fmax(cotangent, s->params->smooth.least_cotangent), s->params->smooth.most_cotangent);
 }
 
-/* One vertex to the mean of its target and its neighbours. */
-static void relax(const smoothing *s, int32_t v) {
+/* Each neighbour is in two spokes, as q of one and r of the other. */
+static int32_t fill_row(const smoothing *s, int32_t v, smooth_edge *out) {
   const orb_map_level *l = s->level;
-  const double reach = s->params->smooth.reach;
-  double all = 2 * s->trust[v] * l->area[v] / (reach * reach), sum[3], *x = l->x + 3 * (size_t)v;
-  for (int k = 0; k < 3; k++) {
-    sum[k] = all * s->target[3 * (size_t)v + (size_t)k];
-  }
+  int32_t count = 0;
   for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
     const orb_map_spoke *spoke = &l->spoke[i];
-    const double wq = bounded(s, spoke->cr), wr = bounded(s, spoke->cq);
-    const double *q = l->x + 3 * (size_t)spoke->q, *r = l->x + 3 * (size_t)spoke->r;
-    for (int k = 0; k < 3; k++) {
-      sum[k] += wq * q[k] + wr * r[k];
+    const double weight[2] = {bounded(s, spoke->cr), bounded(s, spoke->cq)};
+    const int32_t end[2] = {spoke->q, spoke->r};
+    for (int k = 0; k < 2; k++) {
+      int32_t at = 0;
+      while (at < count && out[at].end != end[k]) {
+        at++;
+      }
+      if (at == count) {
+        out[count++] = (smooth_edge){0, end[k]};
+      }
+      out[at].weight += weight[k];
     }
-    all += wq + wr;
   }
-  for (int k = 0; k < 3; k++) {
-    x[k] += s->params->smooth.over * (sum[k] / all - x[k]);
+  return count;
+}
+
+static void fill_edges(const smoothing *s) {
+  const orb_map_level *l = s->level;
+  int32_t count = 0;
+  for (int32_t i = 0; i < moving_count(l); i++) {
+    s->row[i] = count;
+    count += fill_row(s, l->by_colour[i], s->edge + count);
+  }
+  s->row[moving_count(l)] = count;
+}
+
+/* The i-th vertex of by_colour to the mean of its target and its neighbours. */
+static void relax(const smoothing *s, int32_t i) {
+  const orb_map_level *l = s->level;
+  const int32_t v = l->by_colour[i];
+  const double reach = s->params->smooth.reach, own = 2 * s->trust[v] * l->area[v] / (reach * reach);
+  const double *target = s->target + 3 * (size_t)v;
+  double sum[4] = {own * target[0], own * target[1], own * target[2], 0}, all = own;
+  for (int32_t k = s->row[i]; k < s->row[i + 1]; k++) {
+    const smooth_edge *one = &s->edge[k];
+    const double *q = s->point + 4 * (size_t)one->end;
+    for (int j = 0; j < 4; j++) {
+      sum[j] += one->weight * q[j];
+    }
+    all += one->weight;
+  }
+  double *x = s->point + 4 * (size_t)v;
+  for (int j = 0; j < 4; j++) {
+    x[j] += s->params->smooth.over * (sum[j] / all - x[j]);
   }
 }
 
@@ -68,7 +113,7 @@ static void doubt_folds(const smoothing *s) {
   for (int32_t v = 0; v < l->count; v++) {
     for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
       const orb_map_spoke *spoke = &l->spoke[i];
-      if (orb_orient(l->x + 3 * (size_t)v, l->x + 3 * (size_t)spoke->q, l->x + 3 * (size_t)spoke->r) <= 0) {
+      if (orb_orient(s->point + 4 * (size_t)v, s->point + 4 * (size_t)spoke->q, s->point + 4 * (size_t)spoke->r) <= 0) {
         s->smooth[v] *= s->params->smooth.folded;
         break;
       }
@@ -81,47 +126,64 @@ static void weigh(const smoothing *s) {
   const orb_map_level *l = s->level;
   const double outlier = s->params->smooth.outlier;
   for (int32_t v = 0; v < l->count; v++) {
-    const double far2 = orb_distance2(l->x + 3 * (size_t)v, s->target + 3 * (size_t)v);
+    const double far2 = orb_distance2(s->point + 4 * (size_t)v, s->target + 3 * (size_t)v);
     const double scale2 = fmax(l->density[v], ORB_TINY); /* not 0 where the fixed shape has a flat triangle */
     const double share = 1 / (1 + far2 / (scale2 * outlier * outlier));
     s->trust[v] = share * share * s->smooth[v];
   }
 }
 
+static orb_status smoothing_create(orb_context *ctx, smoothing *s) {
+  const orb_map_level *l = s->level;
+  s->target = ORB_NEW(ctx, double, 3 * (size_t)l->count);
+  s->trust = ORB_NEW(ctx, double, l->count);
+  s->smooth = ORB_NEW(ctx, double, l->count);
+  s->point = ORB_NEW0(ctx, double, 4 * (size_t)l->count);
+  s->row = ORB_NEW(ctx, int32_t, (size_t)moving_count(l) + 1);
+  s->edge = ORB_NEW(ctx, smooth_edge, 3 * (size_t)l->triangle_count);
+  if (!s->target || !s->trust || !s->smooth || !s->point || !s->row || !s->edge) {
+    return ORB_E_NO_MEMORY;
+  }
+  memcpy(s->target, l->x, 3 * (size_t)l->count * sizeof *s->target);
+  for (int32_t v = 0; v < l->count; v++) {
+    memcpy(s->point + 4 * (size_t)v, l->x + 3 * (size_t)v, sizeof(double[3]));
+  }
+  fill_edges(s);
+  return ORB_OK;
+}
+
+static void smoothing_free(orb_context *ctx, smoothing *s) {
+  orb_free(ctx, s->target);
+  orb_free(ctx, s->trust);
+  orb_free(ctx, s->smooth);
+  orb_free(ctx, s->point);
+  orb_free(ctx, s->row);
+  orb_free(ctx, s->edge);
+}
+
 orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
   const orb_map_params *p = &c->params;
-  smoothing s = {.level = l,
-                 .params = p,
-                 .target = ORB_NEW(c->ctx, double, 3 * (size_t)l->count),
-                 .trust = ORB_NEW(c->ctx, double, l->count),
-                 .smooth = ORB_NEW(c->ctx, double, l->count)};
-  orb_status status = s.target && s.trust && s.smooth ? ORB_OK : ORB_E_NO_MEMORY;
-  if (status != ORB_OK) {
-    goto done;
-  }
-  memcpy(s.target, l->x, 3 * (size_t)l->count * sizeof *s.target);
+  smoothing s = {.level = l, .params = p};
+  orb_status status;
+  ORB_GO(status, smoothing_create(c->ctx, &s), done);
   doubt_outliers(&s, c->doubted, to_mesh);
   for (int round = 0; round < p->smooth.rounds; round++) {
     for (int sweep = 0; sweep < p->smooth.sweeps; sweep++) {
-      for (int32_t v = 0; v < l->count; v++) {
-        if (!l->pinned[v]) {
-          relax(&s, v);
-        }
+      for (int32_t i = 0; i < moving_count(l); i++) {
+        relax(&s, i);
       }
       ORB_GO(status, orb_context_check(c->ctx), done);
     }
     doubt_folds(&s);
     weigh(&s);
   }
-  for (int32_t v = 0; v < l->count; v++) {
-    if (!l->pinned[v]) {
-      orb_normalize(l->x + 3 * (size_t)v);
-    }
+  for (int32_t i = 0; i < moving_count(l); i++) {
+    double *x = l->x + 3 * (size_t)l->by_colour[i];
+    memcpy(x, s.point + 4 * (size_t)l->by_colour[i], sizeof(double[3]));
+    orb_normalize(x);
   }
   status = orb_map_level_locate_all(c->ctx, l, &c->b, 0);
 done:
-  orb_free(c->ctx, s.target);
-  orb_free(c->ctx, s.trust);
-  orb_free(c->ctx, s.smooth);
+  smoothing_free(c->ctx, &s);
   return status;
 }
