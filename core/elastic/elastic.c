@@ -70,10 +70,11 @@ typedef struct registration {
   orb_searched searched;
   double *diagonal, *right; /* the system */
   double *pull, *target;    /* on each vertex of a: the weight, and the weighted target (3) */
-  int32_t *place, *visit;   /* of each vertex of a: the nearest one of b; of each vertex of b: the nearest one of a */
-  orb_stretch *stretch;     /* NULL: edges are only rotated */
-  double *ahead, *last;     /* of a slide: where it looks, and where it was in the last round; NULL: none */
-  int is_alone;             /* no other registration runs beside this one: its loops run on all threads */
+  int32_t *place, *visit; /* of each vertex of a: the nearest one of b; of each vertex of b: the nearest one of a; −1:
+                             not yet searched */
+  orb_stretch *stretch;   /* NULL: edges are only rotated */
+  double *ahead, *last;   /* of a slide: where it looks, and where it was in the last round; NULL: none */
+  int is_alone;           /* no other registration runs beside this one: its loops run on all threads */
 } registration;
 
 /* Runs body over the vertices [0, count). */
@@ -216,7 +217,7 @@ static void find_places(void *arg, int64_t begin, int64_t end, int thread) {
   registration *r = arg;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
-    r->place[v] = orb_searched_nearest(&r->b.searched, looks_from(r) + 3 * v, r->normal + 3 * v);
+    r->place[v] = orb_searched_nearest(&r->b.searched, looks_from(r) + 3 * v, r->normal + 3 * v, r->place[v]);
   }
 }
 
@@ -224,7 +225,7 @@ static void find_visits(void *arg, int64_t begin, int64_t end, int thread) {
   registration *r = arg;
   (void)thread;
   for (int64_t u = begin; u < end; u++) {
-    r->visit[u] = orb_searched_nearest(&r->searched, r->b.mesh->positions + 3 * u, r->b.normal + 3 * u);
+    r->visit[u] = orb_searched_nearest(&r->searched, r->b.mesh->positions + 3 * u, r->b.normal + 3 * u, r->visit[u]);
   }
 }
 
@@ -411,6 +412,8 @@ static orb_status registration_create(orb_context *ctx, const orb_mesh *a, const
   if (!r->normal || !r->diagonal || !r->right || !r->pull || !r->target || !r->place || !r->visit) {
     return ORB_E_NO_MEMORY;
   }
+  memset(r->place, -1, n * sizeof *r->place); /* no hints for the first round */
+  memset(r->visit, -1, (size_t)b->vertex_count * sizeof *r->visit);
   return factor_create(r);
 }
 

@@ -92,8 +92,10 @@ orb_status orb_searched_create(orb_context *ctx, const double *position, const d
   out->order = ORB_NEW(ctx, int32_t, out->columns);
   out->at = ORB_NEW(ctx, float, (size_t)out->columns *COORDINATES);
   out->box = ORB_NEW(ctx, float, (size_t)out->boxes * 2 * COORDINATES);
+  out->column = ORB_NEW(ctx, int32_t, count);
+  out->whole = ORB_NEW(ctx, float, (size_t)out->boxes / ROW * 2 * COORDINATES);
   point *list = ORB_NEW(ctx, point, count);
-  const int fine = out->order && out->at && out->box && list;
+  const int fine = out->order && out->at && out->box && out->column && out->whole && list;
   if (fine) {
     for (int32_t v = 0; v < count; v++) {
       list[v].vertex = v;
@@ -104,6 +106,7 @@ orb_status orb_searched_create(orb_context *ctx, const double *position, const d
     order_points(list, count);
     for (int32_t i = 0; i < count; i++) {
       out->order[i] = list[i].vertex;
+      out->column[list[i].vertex] = i;
     }
   }
   orb_free(ctx, list);
@@ -114,6 +117,8 @@ void orb_searched_free(orb_context *ctx, orb_searched *s) {
   orb_free(ctx, s->order);
   orb_free(ctx, s->at);
   orb_free(ctx, s->box);
+  orb_free(ctx, s->column);
+  orb_free(ctx, s->whole);
   memset(s, 0, sizeof *s);
 }
 
@@ -131,6 +136,22 @@ static void fill_boxes(const float *column, orb_searched *out, int coordinate) {
   }
 }
 
+/* The boxes around the rows of boxes, of one coordinate. */
+static void fill_whole(orb_searched *out, int coordinate) {
+  const float *least = out->box + (size_t)coordinate * (size_t)out->boxes;
+  const float *greatest = least + COORDINATES * (size_t)out->boxes;
+  const int32_t rows = out->boxes / ROW, blocks = out->columns / BLOCK;
+  for (int32_t r = 0; r < rows; r++) {
+    float *low = out->whole + (size_t)coordinate * (size_t)rows + r, *high = low + COORDINATES * (size_t)rows;
+    *low = least[r * ROW];
+    *high = greatest[r * ROW];
+    for (int32_t b = r * ROW + 1; b < (r + 1) * ROW && b < blocks; b++) {
+      *low = least[b] < *low ? least[b] : *low;
+      *high = greatest[b] > *high ? greatest[b] : *high;
+    }
+  }
+}
+
 void orb_searched_fill(const double *position, const double *normal, orb_searched *out) {
   for (int k = 0; k < COORDINATES; k++) {
     float *column = out->at + (size_t)k * (size_t)out->columns;
@@ -138,6 +159,7 @@ void orb_searched_fill(const double *position, const double *normal, orb_searche
       column[i] = i < out->count ? coordinate_of(position, normal, (size_t)out->order[i], k) : INFINITY;
     }
     fill_boxes(column, out, k);
+    fill_whole(out, k);
   }
 }
 
@@ -211,25 +233,52 @@ static int nearest_box(const row_distances *d) {
   return nearest;
 }
 
-int32_t orb_searched_nearest(const orb_searched *s, const double x[3], const double n[3]) {
+/* The squared distance of a row, as of its boxes: no vertex in it is nearer. */
+static float distance_of_row(const orb_searched *s, int32_t row, const float q[COORDINATES]) {
+  const int32_t rows = s->boxes / ROW;
+  float sum = 0;
+  for (int k = 0; k < COORDINATES; k++) {
+    const float *least = s->whole + (ptrdiff_t)k * rows + row, *greatest = least + (ptrdiff_t)COORDINATES * rows;
+    const float below = *least - q[k], above = q[k] - *greatest;
+    const float d = below > above ? below : above;
+    sum += d > 0 ? d * d : 0;
+  }
+  return sum;
+}
+
+static void look_at_row(const orb_searched *s, int32_t row, const float q[COORDINATES], float *least, int32_t *best) {
+  row_distances d;
+  measure_boxes(s->box + row * ROW, s->boxes, q, &d);
+  const int first = nearest_box(&d);
+  if (d.box[first] < *least) {
+    look_at_block(s, row * ROW + first, q, least, best);
+  }
+  for (int g = 0; g < GROUPS; g++) {
+    for (int i = g; i < ROW && d.least[g] < *least; i += GROUPS) {
+      if (d.box[i] < *least && i != first) {
+        look_at_block(s, row * ROW + i, q, least, best);
+      }
+    }
+  }
+}
+
+int32_t orb_searched_nearest(const orb_searched *s, const double x[3], const double n[3], int32_t hint) {
   float q[COORDINATES], least = INFINITY;
   int32_t best = 0;
   for (int k = 0; k < COORDINATES; k++) {
     q[k] = coordinate_of(x, n, 0, k);
   }
-  for (int32_t row = 0; row < s->boxes; row += ROW) {
-    row_distances d;
-    measure_boxes(s->box + row, s->boxes, q, &d);
-    const int first = nearest_box(&d);
-    if (d.box[first] < least) {
-      look_at_block(s, row + first, q, &least, &best);
+  if (hint >= 0) {
+    best = s->column[hint];
+    least = 0;
+    for (int k = 0; k < COORDINATES; k++) {
+      const float d = s->at[(ptrdiff_t)k * s->columns + best] - q[k];
+      least += d * d;
     }
-    for (int g = 0; g < GROUPS; g++) {
-      for (int i = g; i < ROW && d.least[g] < least; i += GROUPS) {
-        if (d.box[i] < least && i != first) {
-          look_at_block(s, row + i, q, &least, &best);
-        }
-      }
+  }
+  for (int32_t row = 0; row < s->boxes / ROW; row++) {
+    if (distance_of_row(s, row, q) < least) {
+      look_at_row(s, row, q, &least, &best);
     }
   }
   return s->order[best];

@@ -403,8 +403,8 @@ static double away(const double *x, const double *n, const double *y, const doub
  * blocks, and for any count of them. */
 static void the_nearest_vertex_is_found(void **state) {
   (void)state;
-  enum { MOST = 1500 };
-  static const int32_t counts[] = {1, 15, 16, 17, 1024, 1025, MOST};
+  enum { MOST = 3500 };
+  static const int32_t counts[] = {1, 15, 16, 17, 1024, 1025, 2048, 2049, MOST};
   static double at[3 * MOST], normal[3 * MOST];
   uint64_t bits = 88172645463325252ULL;
   for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
@@ -422,7 +422,8 @@ static void the_nearest_vertex_is_found(void **state) {
       orb_searched_fill(at, normal, &searched);
       for (int32_t q = 0; q < 200; q++) {
         const double x[3] = {at[q % n] + 0.1, at[(q + 1) % n], at[(q + 2) % n] - 0.2}, *m = normal + 3 * (q % n);
-        const int32_t found = orb_searched_nearest(&searched, x, m);
+        const int32_t hint = q % 3 == 0 ? -1 : q % 3 == 1 ? q % n : (q * 7919) % n; /* none, a near one, any one */
+        const int32_t found = orb_searched_nearest(&searched, x, m, hint);
         double least = INFINITY;
         for (int32_t v = 0; v < n; v++) {
           least = fmin(least, away(x, m, at + 3 * v, normal + 3 * v));
