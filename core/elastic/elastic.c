@@ -32,7 +32,7 @@
 enum {
   MAP_ROUNDS = 2,    /* along the rough map alone; 8 change little */
   PLACE_ROUNDS = 6,  /* to the nearest places; 10 rank maps no better, and let wrong ones catch up */
-  SETTLE_ROUNDS = 6, /* of a pose that is near already */
+  SETTLE_ROUNDS = 3, /* of a pose that is near already; 6 come no nearer to the truth */
   SLIDE_ROUNDS = 10, /* 15 come nearer to the truth by a fiftieth */
   TURNS = 2,         /* of rotations and positions in a round */
   SURROUNDINGS = 4,  /* one vertex in so many is nearest to a vertex, and their images give its first rotation. With one
