@@ -8,7 +8,7 @@
 typedef struct orb_searched {
   int32_t count;
   int32_t columns; /* the vertices, up to full blocks */
-  int32_t boxes;   /* one a block, up to a full row of them */
+  int32_t boxes;   /* one per block, up to a full row of them */
   int32_t *order;  /* the vertex of each column */
   float *at;       /* six rows of columns: positions and weighted normals. The last ones lie at infinity */
   float *box;      /* twelve rows of boxes: the least, then the greatest coordinates. The last ones lie at infinity */
@@ -23,8 +23,8 @@ void orb_searched_free(orb_context *ctx, orb_searched *searched);
 /* Lays out the vertices, where they are now and as they face. O(n). */
 void orb_searched_fill(const double *position, const double *normal, orb_searched *out);
 
-/* The vertex nearest in position and half-weighted normal. O(n), by vectors, but of a sixteenth: the box of every block
- * is measured, and few blocks are near. */
+/* The vertex nearest in position and half-weighted normal. Measures the box of every block, a sixteenth of n, by
+ * vectors; few blocks are near. O(n). */
 int32_t orb_searched_nearest(const orb_searched *searched, const double position[3], const double normal[3]);
 
 #endif
