@@ -241,7 +241,7 @@ test('a refusal of a bad mesh says what is wrong and where', async (t) => {
   }
   const twisted = await refused(strip, 422, 'not-orientable');
   assert.equal(twisted.edges.length, 1);
-  assert.match(twisted.detail, /one side only.*Cut the surface there, and close it\.$/);
+  assert.match(twisted.detail, /only one side.*Cut the surface there, and close it\.$/);
   await refused(obj(m).replace('v 1 0 0', 'v nan 0 0'), 422, 'not-finite');
   const grown = (scale, shift = 0) => ({ ...m, positions: m.positions.map((p) => p.map((x) => x * scale + shift)) });
   for (const scale of [1.1e30, 1e100, 1e150, 1e200, 1e308]) {
