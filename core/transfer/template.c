@@ -211,7 +211,7 @@ static orb_status make_normals(const maker *m, const orb_template *made, orb_dra
   return status;
 }
 
-/* One value of `width` floats a vertex made. */
+/* One value of `width` floats per vertex made. */
 static orb_status make_attribute(const maker *m, int32_t width, size_t offset, orb_wedges *out) {
   *out = (orb_wedges){.width = width, .value_count = m->count};
   out->values = ORB_NEW(m->ctx, float, (int64_t)width * m->count);
