@@ -27,7 +27,7 @@ typedef struct trial {
   orb_elastic_pose pose[2];
   double bend[2];
   double rough; /* cost in the first direction alone */
-  double cost;  /* INFINITY: dropped, since its rough cost is too far behind or landmarks contradict it */
+  double cost;  /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it */
 } trial;
 
 /* How a shape is scaled: to area 4π, around the middle of its box. */
@@ -42,7 +42,7 @@ typedef struct orb_match_search {
   orb_coarse_copy copy[2]; /* scaled */
   orb_hint_places hint;    /* empty: none */
   orb_spectral_dense dense;
-  int32_t *rotated[2]; /* the rotations' maps, one after the other: as those of `dense` */
+  int32_t *rotated[2]; /* the maps of the rotations, one after the other, laid out as in `dense` */
   trial trial[TRIALS];
   int32_t count;
   int32_t list[1 + ORB_MATCH_OTHERS]; /* the best trial and those that differ, in the order of the match */
@@ -246,9 +246,10 @@ static void fill_costs(search *t, int directions) {
   }
 }
 
-/* Registers all in one direction, drops those that are too far behind to win, and registers the others back. Trials
- * that take the landmarks elsewhere are dropped after the first direction, or, where all do, after the second: arms
- * that lie on a body are registered to it in one direction, and rightly in the other. */
+/* Registers all trials in one direction, drops those that are too far behind to win, and registers the others in the
+ * other direction. Trials that take the landmarks elsewhere are dropped after the first direction. If all do, they are
+ * dropped after the second one instead: arms that lie against a body are registered to it in one direction, but
+ * correctly in the other. */
 static orb_status rank(search *t) {
   ORB_TRY(register_all(t, 0));
   const int agrees = any_agrees(t);
@@ -270,7 +271,7 @@ static orb_status rank(search *t) {
   return ORB_OK;
 }
 
-/* How far apart two trials take the vertices of the first copy, in the mean, in diagonals. */
+/* The mean distance between the images of the first copy's vertices under two trials, in diagonals. */
 static double difference(const search *t, const trial *x, const trial *y) {
   int32_t n = t->copy[0].mesh.vertex_count;
   orb_extent extent;
@@ -342,8 +343,9 @@ static orb_status write_pairs(const search *t, const trial *one, orb_match_pairs
   return ORB_OK;
 }
 
-/* How many times as much another trial bends the shapes. Its cost counts as much as its bend: files say which of two
- * sides that look alike is to be the front, but not that they look different. */
+/* How many times as much another trial bends the shapes: the geometric mean of the ratios of their bends and of their
+ * costs. So the rotation in space counts by half: files say which of two sides that look alike is the front, but not
+ * that they look different. */
 static double lead_over(const trial *best, const trial *other) {
   const int both = other->cost < INFINITY;
   const double bend = both ? (best->bend[0] + best->bend[1]) / 2 : best->bend[0];
@@ -353,7 +355,7 @@ static double lead_over(const trial *best, const trial *other) {
   return more * dearer < most * most * bend * cost ? sqrt(more / bend * (dearer / cost)) : most;
 }
 
-/* The listed trials, but not the targets. */
+/* Writes the listed trials, without targets. */
 static orb_status write_ranking(const search *t, orb_match *out) {
   const trial *best = &t->trial[t->list[0]];
   double cost = 1;
@@ -373,9 +375,9 @@ static orb_status write_ranking(const search *t, orb_match *out) {
   return write_pairs(t, best, &out->pairs);
 }
 
-/* Registers a trial's second copy again with the landmarks as anchors. They only excluded maps until here, since they
- * would draw a wrong one to their partners as well. Where they bend it far more than it was bent, they have twisted a
- * limb or the waist, and the pose without them stays until it settles. */
+/* Registers a trial's second copy again with the landmarks as anchors. Until here landmarks only excluded maps, since
+ * anchors would draw a wrong map to their partners as well. If the anchors bend the copy far more than before, they
+ * have twisted a limb or the waist; then the pose without them stays until it settles. */
 static orb_status draw_to_landmarks(const search *t, trial *one) {
   const orb_mesh *copy = &t->copy[1].mesh;
   orb_elastic_anchor *anchors = NULL;
@@ -441,7 +443,7 @@ end:
   return status;
 }
 
-/* Places the landmarks on the copies. *stretch: how far they say that the shapes are not one in two poses. */
+/* Places the landmarks on the copies. *stretch: see orb_hint_stretch(). */
 static orb_status take_hint(search *t, const orb_match_hint *hint, double *stretch) {
   double *at[2];
   int32_t count = 0, few = 0;
@@ -465,7 +467,7 @@ static orb_status take_hint(search *t, const orb_match_hint *hint, double *stret
   return orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch);
 }
 
-/* Does a trial show one shape in two poses? Where it does not, other starts lead to better maps. */
+/* Does a trial show one body in two poses? If it does not, other starts lead to better maps. */
 static int is_one_shape(const trial *one, const orb_match_hint *hint, double stretch) {
   return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
 }

@@ -1,6 +1,6 @@
 /* Method `rotate`: rotations of whole spheres, by landmarks or by search. Matrices are row-major: q = R p.
  *
- * Comes in: sheets, perhaps with landmarks. Goes out: the same with rotated spheres, certified. Read in this order:
+ * In: sheets, perhaps with landmarks. Out: the same with rotated spheres, certified. Read in this order:
  *
  *   procrustes.h  rotations by landmarks
  *   correlate.h   the search without landmarks, or with too few

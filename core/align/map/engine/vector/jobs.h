@@ -20,9 +20,9 @@ typedef struct orb_map_step_job {
   orb_map_level *level;
   double *row;       /* ORB_MAP_ROW a vertex: position, point on the sphere, normal, density there */
   int32_t *triangle; /* of each vertex: its place, */
-  double *at;        /* and its coordinates there, 3 a vertex */
+  double *at;        /* and its coordinates there, 3 per vertex */
   int32_t *ring;     /* of each spoke: the neighbour */
-  float *spoke;      /* 4 a spoke: cotangents at the vertex, at the neighbour and at the next; area */
+  float *spoke;      /* 4 per spoke: cotangents at the vertex, at the neighbour and at the next; area */
   int32_t *list;     /* the vertices to step, no two of them neighbours, with at most ORB_MAP_STEP_RING_MAX spokes */
   int pulled;        /* some vertex has a spatial target */
 } orb_map_step_job;
