@@ -40,10 +40,11 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
     }
   }
   if (!count && cli_number(supermesh, "energy") > ENERGY_MOST) {
-    fprintf(out,
-            "%sThe maps stretch some places strongly (energy %.3g; a good map is below %.2g). Set a landmark on each limb "
-            "that morphs badly.\n",
-            bullet, cli_number(supermesh, "energy"), ENERGY_MOST);
+    fprintf(
+        out,
+        "%sThe maps stretch some places strongly (energy %.3g; a good map is below %.2g). Set a landmark on each limb "
+        "that morphs badly.\n",
+        bullet, cli_number(supermesh, "energy"), ENERGY_MOST);
     count++;
   }
   return count;

@@ -69,7 +69,7 @@ struct Keeper {
   std::vector<int32_t> first;  /* per mesh: the number of its first vertex */
   std::vector<int32_t> showed; /* how often the scene shows it */
   std::vector<Matrix> matrix;
-  std::map<size_t, int64_t> zeros; /* accessors of so many vertices that stay */
+  std::map<size_t, int64_t> zeros; /* accessors of this many vertices that stay */
   Widened widened;
 
   Keeper(orb_context *context, cJSON *document, const orb_gltf_shapes &given, orb_gltf_kept *facts)

@@ -116,7 +116,7 @@ typedef struct encoder {
   int32_t count;
   int compressed;
   double slack;
-  float *shown; /* the decoded base, 3 a vertex */
+  float *shown; /* the decoded base, 3 per vertex */
 } encoder;
 
 static orb_status encode_octahedra(encoder *self, int bits, orb_stream *out) {
@@ -209,7 +209,7 @@ static orb_status encode_floats(encoder *self, int filtered, orb_stream *out) {
   return ORB_OK;
 }
 
-/* Stores the delta of a vertex with so many digits, aimed at `goal` from what the base shows. Returns the bound. */
+/* Stores the delta of a vertex with this many digits, aimed at `goal` from what the base shows. Returns the bound. */
 static double try_digits(const encoder *self, size_t i, const double a[3], const double b[3], const double goal[3],
                          int bits, int exponent, float shown[3], uint32_t stored[3]) {
   double e[3], f[3];
