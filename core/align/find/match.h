@@ -4,7 +4,8 @@
  * In: two meshes. Out: where each vertex of the second lies on the first. Read in this order:
  *
  *   hint.h    what landmarks say of a match
- *   match.h   the best of the rough maps
+ *   trials.h  rough maps, registered and ranked
+ *   match.h   the best of them, its pairs and its targets
  *   found.h   the landmarks that an alignment found, and their confidence
  *   params.h  all thresholds
  *
@@ -38,7 +39,7 @@ typedef struct orb_match_other {
   orb_match_pairs pairs;
 } orb_match_other;
 
-typedef struct orb_match_search orb_match_search; /* match.c */
+typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_match {
   int is_found; /* 0: a shape has too few vertices, or no map was found; nothing else is filled then */
@@ -50,8 +51,8 @@ typedef struct orb_match {
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  double *target; /* where each vertex of the second shape lies on the first one, in its space: 3 per vertex */
-  orb_match_search *search; /* the candidates, for the two functions below */
+  double *target;     /* where each vertex of the second shape lies on the first one, in its space: 3 per vertex */
+  orb_trials *trials; /* the candidates, for the two functions below */
 } orb_match;
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
