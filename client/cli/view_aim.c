@@ -8,10 +8,10 @@
 #include "view_pose.h"
 
 enum {
-  CELLS = 24,     /* of the grid along each axis of the bounding box */
-  SAMPLES = 8,    /* points of a triangle along each edge */
-  YAW_STEP = 5,   /* degrees */
-  DEPTH_TURN = 22 /* degrees away from the largest side */
+  CELLS = 24,    /* of the grid along each axis of the bounding box */
+  SAMPLES = 8,   /* points of a triangle along each edge */
+  YAW_STEP = 5,  /* degrees */
+  DEPTH_YAW = 22 /* degrees away from the largest side */
 };
 /* A mirror image has to fill this much more of the same cells along one axis than along the others. */
 static const double CLEARLY_MIRRORED = 0.15;
@@ -162,13 +162,13 @@ static double shown(const view_mesh *mesh, const double to[3]) {
 }
 
 static double find_yaw(const view_mesh *mesh, char up) {
-  view_turn turn;
+  view_rotation rotation;
   double best = 0, yaw = 0;
-  view_upright(up, turn);
+  view_upright(up, rotation);
   for (int degrees = -90; degrees < 90; degrees += YAW_STEP) {
     double angle = degrees * 3.14159265358979 / 180, to[3];
     for (int k = 0; k < 3; k++) {
-      to[k] = sin(angle) * turn[0][k] + cos(angle) * turn[2][k];
+      to[k] = sin(angle) * rotation[0][k] + cos(angle) * rotation[2][k];
     }
     double area = shown(mesh, to);
     /* of sides of nearly the same area, prefer the one nearer to the front */
@@ -177,7 +177,7 @@ static double find_yaw(const view_mesh *mesh, char up) {
       yaw = degrees;
     }
   }
-  return yaw > 0 ? yaw - DEPTH_TURN : yaw + DEPTH_TURN;
+  return yaw > 0 ? yaw - DEPTH_YAW : yaw + DEPTH_YAW;
 }
 
 void view_aim(const view_mesh *mesh, view_options *options) {

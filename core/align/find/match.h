@@ -44,7 +44,7 @@ typedef struct orb_trials orb_trials; /* trials.h */
 typedef struct orb_match {
   int is_found; /* 0: a shape has too few vertices, or no map was found; nothing else is filled then */
   double bend;  /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
-  double cost;  /* its bend, times 1 to 1 + ORB_FIND_TURN_COST for its rotation in space */
+  double cost;  /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space */
   double clear; /* 0 to 1: how far the next best map that differs is behind */
   double lead;  /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
                    half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */

@@ -26,7 +26,7 @@ enum {
 /* A rotation by π in space multiplies the bend of a map by 1 + this, because files usually have shapes upright and
  * facing one way: a man matched back to front bends hardly more than one matched correctly. With 1 instead, bodies
  * whose files face away from each other are matched back to front. */
-static const double ORB_FIND_TURN_COST = 0.5;
+static const double ORB_FIND_ROTATION_COST = 0.5;
 /* A spectral map that costs this much more than the first is not tried: among the pairs of posed people, none was
  * right. */
 static const double ORB_FIND_SPECTRAL_BEHIND = 0.8;

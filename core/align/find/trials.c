@@ -158,7 +158,7 @@ static orb_status register_all(orb_trials *t, int direction) {
 }
 
 /* The angle of the rotation that carries copy s best onto its pose, over π. */
-static double turn_of(const orb_trials *t, const orb_trial *one, int s) {
+static double rotation_of(const orb_trials *t, const orb_trial *one, int s) {
   const orb_mesh *mesh = &t->copy[s].mesh;
   const double *x = mesh->positions, *y = one->pose[s].position;
   double mean[2][3] = {{0}}, h[9] = {0}, r[9];
@@ -183,7 +183,7 @@ static void fill_cost(const orb_trials *t, orb_trial *one, int directions) {
   for (int s = 0; s < directions; s++) {
     bend += one->bend[s] / directions;
   }
-  one->cost = bend * (1 + ORB_FIND_TURN_COST * turn_of(t, one, 0));
+  one->cost = bend * (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0));
 }
 
 int32_t orb_trials_best(const orb_trials *t) {
