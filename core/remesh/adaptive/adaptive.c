@@ -180,7 +180,8 @@ static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, o
 }
 
 /* For a twisted map: all steps, to a net within the tolerance. */
-static orb_status remesh_twisted(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_placed_net *placed) {
+static orb_status remesh_twisted(orb_context *ctx, const orb_remesh_job *job, double tolerance,
+                                 orb_placed_net *placed) {
   double limit2 = tolerance * tolerance;
   ORB_TRY(orb_adaptive_start_from_reduced(ctx, job, limit2, placed));
   orb_progress(ctx, "remesh", 0.3);
