@@ -1,5 +1,7 @@
 /* The driver: simplify, base mesh, insertion, intermittent optimisation (Algorithm 1).
  *
+ * In: a mesh that orb_mesh_repair() accepted. Out: a unit vector for each vertex, not certified yet.
+ *
  * Reading order of the folder: kernel_sampling.h (what differs from the paper and why), this file, mesh (the
  * progressive mesh), simplify (section 4), sample (Eq. 2 and 3 in double precision), search (the same in floats, for
  * speed).

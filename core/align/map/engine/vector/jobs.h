@@ -1,7 +1,10 @@
 /* The loop that decides how long an alignment takes, and what it is given: one damped Newton step for each vertex of a
- * list, several vertices at once. One source (the .inc.h files of this folder) is compiled for several vector widths;
- * loops.c chooses a version at run time. Results do not depend on the number of threads; between instruction sets their
- * last bits may differ. Read in this order:
+ * list, several vertices at once.
+ *
+ * In: a level as steps read it, and a list of its vertices, no two of them neighbours. Out: each vertex of the list
+ * where its step takes it. One source (the .inc.h files of this folder) is compiled for several vector widths; loops.c
+ * chooses a version at run time. Results do not depend on the number of threads; between instruction sets their last
+ * bits may differ. Read in this order:
  *
  *   batch.inc.h     the stars of several vertices: reading them, and their energy
  *   expand.inc.h    its gradient and Hessian, and the Newton direction
