@@ -74,6 +74,8 @@ test('every format is detected by its content', async (t) => {
     assert.equal(reply.json.format, format);
     assert.equal(reply.json.vertices, m.positions.length, format);
     assert.equal(reply.json.triangles, m.triangles.length, format);
+    const file = await d.get(`${reply.json.url}/file`);
+    assert.match(file.headers.get('content-disposition'), new RegExp(`\\.${format}\\b`), format);
   }
   const big = await d.upload(shapes.binaryPly(m, true));
   assert.equal(big.status, 201, big.bytes.toString());
