@@ -6,7 +6,7 @@
 #include "api/json.h"
 #include "api/options.h"
 
-/* The string of a member; NULL where it is absent, and with *fine 0 where it is none. */
+/* The string of a member; NULL if the member is absent or not a string. In the latter case *fine becomes 0. */
 static const char *text_of(const cJSON *body, const char *name, int *fine, api_problem *problem) {
   const cJSON *member = cJSON_GetObjectItemCaseSensitive(body, name);
   if (member && !cJSON_IsString(member)) {

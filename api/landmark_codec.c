@@ -104,7 +104,7 @@ static int read_places(const cJSON *at, int32_t landmark, api_landmark_list *lis
   return 1;
 }
 
-#define LEAST_WEIGHT 0.01 /* a softer spring holds nothing that a person sees */
+#define LEAST_WEIGHT 0.01 /* a softer spring has no visible effect */
 #define AT(field) offsetof(api_landmark_spec, field)
 static const api_option numbers[] = {{"pass", API_OPTION_INT32, AT(pass), 0, 100, NULL},
                                      {"radius", API_OPTION_NUMBER, AT(radius), 0, 2, NULL},

@@ -17,8 +17,8 @@ static const struct {
              {"split_nonmanifold", ORB_REPAIR_SPLIT}};
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
-/* No loop is shorter than the least size: a float's rounding. None is longer than the most: a path from end to end and
- * back, with room for detours. */
+/* The least size is a float's rounding: no loop is shorter. The most is a path from end to end and back, with room for
+ * detours: none is longer. */
 static const double HANDLE_SIZE_LEAST = 1e-6, HANDLE_SIZE_MOST = 10;
 
 static int read_handle_size(const char *text, size_t length, orb_repair_options *out, api_problem *problem) {

@@ -37,9 +37,16 @@ typedef struct api_mesh_facts {
 } api_mesh_facts;
 void api_mesh_write(const api_mesh_facts *facts, api_text *out);
 
+/* As large as the longest name of a format. */
+#define API_FORMAT_NAME(id, value, function, name) char of_##function[sizeof(name)];
+typedef union api_format_name {
+  ORB_FORMATS(API_FORMAT_NAME)
+} api_format_name;
+#undef API_FORMAT_NAME
+
 /* What later requests need from a stored description. */
 typedef struct api_mesh_summary {
-  char name[ORB_NAME_MAX], format[8], repair[API_REPAIR_TEXT];
+  char name[ORB_NAME_MAX], format[sizeof(api_format_name)], repair[API_REPAIR_TEXT];
   int64_t vertices, triangles, file_vertices, file_triangles;
 } api_mesh_summary;
 /* Returns 1, or 0 if the text does not decode. */

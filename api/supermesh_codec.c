@@ -8,7 +8,7 @@
 #include "api/json.h"
 #include "api/report_codec.h"
 
-/* Of those that are not soft. */
+/* Of the landmarks that are not soft. */
 static int landmarks_exact(const orb_merge_result *result) {
   int32_t shapes = result->supermesh.shape_count;
   for (int32_t l = 0; l < result->alignment.landmark_count; l++) {
@@ -249,11 +249,11 @@ static void write_suspects(const api_supermesh_request *request, const orb_align
   api_json_close(out, ']');
 }
 
-/* From this confidence on a match is sure. docs/bench-confidence.md says how often a sure one is right;
- * no lower one is promised. */
+/* A match is sure from this confidence on. docs/bench-confidence.md says how often a sure match is right, and promises
+ * nothing below. */
 static const double SURE = 0.8;
 
-/* How far the correspondence that was found may be relied on; nothing where none was searched. */
+/* Appends how reliable the correspondence is that was found; nothing if none was searched. */
 static void write_match(const orb_match_facts *match, api_text *out) {
   if (!match->is_measured) {
     return;
@@ -396,7 +396,7 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_text_free(&canonical);
 }
 
-/* Appends members that are texts or whole numbers, as far as the object has them. */
+/* Appends the members of this list that the object has: texts or whole numbers. */
 static void copy_members(const cJSON *from, const char *const *names, api_text *out) {
   for (; *names; names++) {
     const cJSON *member = cJSON_GetObjectItemCaseSensitive(from, *names);

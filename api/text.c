@@ -126,7 +126,7 @@ void api_json_string(api_text *text, const char *utf8) {
   quoted(text, utf8);
 }
 
-/* Writes a number of at least so many digits in front of `end`; returns where it begins. */
+/* Writes a number of at least this many digits in front of `end`; returns where it begins. */
 static char *digits_before(char *end, uint64_t value, int least) {
   for (; value > 0 || least > 0; value /= 10, least--) {
     *--end = (char)('0' + value % 10);

@@ -53,7 +53,7 @@ static int read_entry(const cJSON *item, int32_t shape_count, int32_t index, orb
   }
   if (resolution && (out->what != ORB_CARRY_TEXTURE || !is_whole(resolution, ORB_BAKE_LEAST, ORB_BAKE_MOST))) {
     return REFUSE(problem, index,
-                  "\"resolution\" of entry %d of \"transfer\" is the texels a side of a \"texture\", %d to %d.",
+                  "\"resolution\" of entry %d of \"transfer\" must be the texels per side of a \"texture\", %d to %d.",
                   (int)index, (int)ORB_BAKE_LEAST, (int)ORB_BAKE_MOST);
   }
   out->resolution = resolution ? (int32_t)resolution->valuedouble : 0;

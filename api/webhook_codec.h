@@ -11,7 +11,7 @@
 #define API_EVENT(state) (1U << ((unsigned)(state) - (unsigned)API_JOB_SUCCEEDED))
 enum { API_EVENTS_ALL = 7, API_EVENTS_TEXT = 40, API_WEBHOOK_URL = 2048 };
 
-/* Parses a list such as "succeeded,failed". 0: one of the names is not an event, or there is none. */
+/* Parses a list such as "succeeded,failed". Returns 0 if one of the names is not an event, or there is none. */
 int api_events_parse(const char *list, unsigned *out);
 void api_events_write(unsigned events, char out[API_EVENTS_TEXT]);
 
@@ -21,7 +21,7 @@ typedef struct api_webhook {
   char url[API_WEBHOOK_URL]; /* "": the request has none */
   unsigned events;
 } api_webhook;
-/* Removes the member from the body. 1, or 0 with the problem. */
+/* Removes the member from the body. Returns 1, or 0 with *problem filled. */
 int api_webhook_take(cJSON *body, api_webhook *out, api_problem *problem);
 
 /* The body of a delivery. job: the job as JSON. */

@@ -20,7 +20,7 @@ static void set_text(const cli *c, cJSON *request, cli_option_id option, const c
   }
 }
 
-/* One entry of --transfer, such as 1:texture:2048. NULL: it is none. */
+/* One entry of --transfer, such as 1:texture:2048. Returns NULL if it is not valid. */
 static cJSON *read_transfer(char *entry, long shapes) {
   char *what = strchr(entry, ':'), *texels = what ? strchr(what + 1, ':') : NULL;
   long from, resolution = 0;
@@ -103,7 +103,7 @@ static int add_options(const cli *c, cJSON *request) {
   return cli_apply_sets(c, request);
 }
 
-/* Whether each landmark has a place on each shape. What else is wrong with a landmark, the daemon says. */
+/* Whether each landmark has a place on each shape. The daemon reports everything else that is wrong with a landmark. */
 static int have_all_shapes(const cli *c, const char *file, const cJSON *list) {
   const cJSON *item;
   int number = 0;
@@ -141,8 +141,8 @@ static int make_request(cli *c, cJSON **out) {
   return add_options(c, request);
 }
 
-/* The daemon checks, before any upload, what only it can check. It gets the request with meshes that do not exist, and
- * reads all of it before it looks for them. */
+/* Lets the daemon check, before any upload, what only the daemon can check. Sends the request with meshes that do not
+ * exist: the daemon reads all of a request before it looks for its meshes. */
 static int ask_daemon(cli *c, const cJSON *request) {
   if (cJSON_GetArraySize(request) == 1) {
     return CLI_DONE; /* nothing but the shapes */

@@ -76,8 +76,8 @@ const char *cli_advice(const char *type) {
        "the "
        "surface there."},
       {"not-orientable",
-       "The faces cannot all point outward. Cut a surface that has one side only at the edge above, and close it. "
-       "Faces that --repair none leaves reversed: recalculate the normals, or upload with --repair safe."},
+       "The faces cannot all point outward. If the surface has only one side, cut it at the edge above and close it. "
+       "If --repair none left faces reversed, recalculate the normals, or upload with --repair safe."},
       {"not-connected",
        "The file holds several pieces. Join them into one closed surface, upload each piece by itself, or "
        "keep one: --repair largest_component keeps the largest, --take-part another."},

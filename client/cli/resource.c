@@ -60,7 +60,7 @@ int cli_find(cli *c, const char *operand, char **path, cli_reply *reply) {
   return rc;
 }
 
-/* A device or a pipe is written to; a file is replaced by one that was written beside it. */
+/* Whether the bytes go straight to a device or a pipe. A file is replaced by one that was written beside it instead. */
 static int is_stream(const char *file) {
   struct stat info;
   return !strcmp(file, "-") || (stat(file, &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode));

@@ -8,10 +8,10 @@
 #include "view_pose.h"
 
 enum {
-  CELLS = 24,     /* of the grid along each axis of the bounding box */
-  SAMPLES = 8,    /* points of a triangle along each edge */
-  YAW_STEP = 5,   /* degrees */
-  DEPTH_TURN = 22 /* degrees away from the largest side */
+  CELLS = 24,    /* of the grid along each axis of the bounding box */
+  SAMPLES = 8,   /* points of a triangle along each edge */
+  YAW_STEP = 5,  /* degrees */
+  DEPTH_YAW = 22 /* degrees away from the largest side */
 };
 /* A mirror image has to fill this much more of the same cells along one axis than along the others. */
 static const double CLEARLY_MIRRORED = 0.15;
@@ -75,8 +75,8 @@ static double mirrored(const grid *g, int axis) {
   return either ? (double)both / either : 0;
 }
 
-/* On how many feet the shape stands if this end of the axis is down: separate spots beside the plane in which `across`
- * mirrors it. 0 if it touches the ground on that plane, as a shape does that lies. */
+/* The number of feet on which the shape stands if this end of the axis is down: separate spots beside the plane in
+ * which `across` mirrors the shape. 0 if the shape touches the ground on that plane, as one does that lies down. */
 static int feet(const grid *g, int axis, int high_end, int across) {
   unsigned char floor[CELLS][CELLS] = {{0}};
   int stack[CELLS * CELLS], count = 0;
@@ -138,7 +138,7 @@ static char find_up(const view_mesh *mesh) {
   return 'y';
 }
 
-/* The area that the shapes show from a direction, twice: of a closed surface half faces the viewer. */
+/* Twice the area that the shapes show from a direction, since half of a closed surface faces the viewer. */
 static double shown(const view_mesh *mesh, const double to[3]) {
   double sum = 0;
   for (int shape = 0; shape < view_shape_count(mesh); shape++) {
@@ -162,22 +162,22 @@ static double shown(const view_mesh *mesh, const double to[3]) {
 }
 
 static double find_yaw(const view_mesh *mesh, char up) {
-  view_turn turn;
+  view_rotation rotation;
   double best = 0, yaw = 0;
-  view_upright(up, turn);
+  view_upright(up, rotation);
   for (int degrees = -90; degrees < 90; degrees += YAW_STEP) {
     double angle = degrees * 3.14159265358979 / 180, to[3];
     for (int k = 0; k < 3; k++) {
-      to[k] = sin(angle) * turn[0][k] + cos(angle) * turn[2][k];
+      to[k] = sin(angle) * rotation[0][k] + cos(angle) * rotation[2][k];
     }
     double area = shown(mesh, to);
-    /* of sides of nearly the same area, the one nearer to the front */
+    /* of sides of nearly the same area, prefer the one nearer to the front */
     if (area > 1.001 * best || (area > 0.999 * best && abs(degrees) < fabs(yaw))) {
       best = fmax(area, best);
       yaw = degrees;
     }
   }
-  return yaw > 0 ? yaw - DEPTH_TURN : yaw + DEPTH_TURN;
+  return yaw > 0 ? yaw - DEPTH_YAW : yaw + DEPTH_YAW;
 }
 
 void view_aim(const view_mesh *mesh, view_options *options) {

@@ -5,8 +5,8 @@
 
 #include "view_glb.h"
 
-/* The mesh to draw, and its first target that is a shape: an uploaded document that has got targets may have others
- * before. */
+/* The mesh to draw, and its first target that is a shape: an uploaded document to which targets were added may have
+ * others before it. */
 static const cJSON *find_mesh(const glb_file *r, uint32_t *first) {
   const cJSON *mesh;
   cJSON_ArrayForEach(mesh, cJSON_GetObjectItemCaseSensitive(r->json, "meshes")) {

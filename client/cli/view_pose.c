@@ -3,18 +3,18 @@
 #include <math.h>
 #include <string.h>
 
-void view_upright(char up, view_turn out) {
+void view_upright(char up, view_rotation out) {
   static const struct {
     char up;
-    view_turn turn;
-  } turns[] = {
+    view_rotation rotation;
+  } rotations[] = {
       {'y', {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},  {'Y', {{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
       {'z', {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}, {'Z', {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}},
       {'x', {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}}, {'X', {{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}}},
   };
-  for (size_t i = 0; i < sizeof turns / sizeof turns[0]; i++) {
-    if (i == 0 || turns[i].up == up) {
-      memcpy(out, turns[i].turn, sizeof(view_turn));
+  for (size_t i = 0; i < sizeof rotations / sizeof rotations[0]; i++) {
+    if (i == 0 || rotations[i].up == up) {
+      memcpy(out, rotations[i].rotation, sizeof(view_rotation));
     }
   }
 }
@@ -26,11 +26,11 @@ static void view_axes(const view_options *options, double out[3][3]) {
   double to[3] = {sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)};
   double up[3] = {-sin(yaw) * sin(pitch), cos(pitch), -cos(yaw) * sin(pitch)};
   const double *rows[3] = {right, up, to};
-  view_turn turn;
-  view_upright(options->up, turn);
+  view_rotation rotation;
+  view_upright(options->up, rotation);
   for (int r = 0; r < 3; r++) {
     for (int c = 0; c < 3; c++) {
-      out[r][c] = rows[r][0] * turn[0][c] + rows[r][1] * turn[1][c] + rows[r][2] * turn[2][c];
+      out[r][c] = rows[r][0] * rotation[0][c] + rows[r][1] * rotation[1][c] + rows[r][2] * rotation[2][c];
     }
   }
 }

@@ -8,8 +8,8 @@
 
 /* The rotation that makes an axis of the file point up (view_options.up): its rows are the axes that become x, y and z.
  */
-typedef double view_turn[3][3];
-void view_upright(char up, view_turn out);
+typedef double view_rotation[3][3];
+void view_upright(char up, view_rotation out);
 
 /* The pose at t, 0 to 1, of the transition from shape `from` to shape `to`, in the viewer's axes: x right, y up, z
  * towards the viewer. */

@@ -5,12 +5,12 @@
 
 #include "text.h"
 
-/* A good map of two whole animals is below; docs/bench-truth.md has the energies of many. */
+/* A good map of two whole animals has less; docs/bench-truth.md has the energies of many. */
 static const double ENERGY_MOST = 2, MEDIAN_MOST = 1.5;
 static const double INVERTED_MOST = 0.005;     /* of the triangles */
 static const double CONFIDENCE_LEAST = 0.3;    /* of a found landmark */
 static const double TOLERANCE_ROUNDING = 1.01; /* a proved bound may exceed the tolerance by rounding */
-static const double THIN_MOST = 0.01;          /* of the surface: a patch or two are hardly seen */
+static const double THIN_MOST = 0.01;          /* of the surface: a patch or two are hardly visible */
 static const double TURNED_OVER = 60;          /* degrees of the y axis */
 
 static const cJSON *member(const cJSON *object, const char *name) {
@@ -40,10 +40,11 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
     }
   }
   if (!count && cli_number(supermesh, "energy") > ENERGY_MOST) {
-    fprintf(out,
-            "%sThe maps stretch some places much (energy %.3g; a good map is below %.2g). A landmark on each limb that "
-            "morphs badly helps.\n",
-            bullet, cli_number(supermesh, "energy"), ENERGY_MOST);
+    fprintf(
+        out,
+        "%sThe maps stretch some places strongly (energy %.3g; a good map is below %.2g). Set a landmark on each limb "
+        "that morphs badly.\n",
+        bullet, cli_number(supermesh, "energy"), ENERGY_MOST);
     count++;
   }
   return count;
@@ -85,7 +86,7 @@ static void print_place(FILE *out, const cJSON *at) {
   } else if (member(at, "vertex")) {
     fprintf(out, "vertex %.0f", cli_number(at, "vertex"));
   } else {
-    fputs("the place that the answer names", out);
+    fputs("the place that the report names", out);
   }
 }
 
@@ -138,7 +139,8 @@ static int warn_of_landmarks(FILE *out, const char *bullet, const cJSON *superme
   return count > 0;
 }
 
-/* One line names all shapes that are farther from their files than the tolerance allows: --max-triangles wins. */
+/* One line names all shapes that are farther from their files than the tolerance allows: --max-triangles takes
+ * precedence. */
 static int warn_of_errors(FILE *out, const char *bullet, const cJSON *supermesh) {
   double tolerance = cli_number(member(member(supermesh, "request"), "remesh"), "tolerance");
   const cJSON *shape;

@@ -28,8 +28,8 @@ static orb_status check_weights(orb_context *ctx, const orb_landmark *landmarks,
     }
     if (weight > 0 && weight < 1 && options->method != ORB_ALIGN_PIN && options->method != ORB_ALIGN_AUTO) {
       return orb_fail(ctx, ORB_E_BAD_OPTION,
-                      "Landmark %d has a weight below 1, which the method pin alone understands. Choose pin, or leave "
-                      "the weight out.",
+                      "Landmark %d has a weight below 1, which only the method pin accepts. Choose pin, or omit the "
+                      "weight.",
                       l);
     }
   }
@@ -78,12 +78,12 @@ static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, 
              : orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
 }
 
-/* Is a copy too coarse for what its whole shape can do? */
+/* Is this the failure of a copy that is too coarse, where the whole shape may succeed? */
 static int is_of_copy(orb_status status) {
   return status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED;
 }
 
-/* Aligns copies of the later shapes, and lets the shapes follow. *lifted 0: the whole shapes are to be aligned, since
+/* Aligns copies of the later shapes, then lets the shapes follow. *lifted 0: the whole shapes must be aligned, because
  * the copies do not meet at the landmarks or are not certified, or a shape cannot follow its copy. `out` is then empty.
  */
 static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -109,7 +109,8 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
   return status;
 }
 
-/* What a reader may know of the alignment: found landmarks and how sure they are, or landmarks that may be misplaced.
+/* Adds what a reader may know of the alignment: found landmarks and how sure they are, or landmarks that may be
+ * misplaced.
  */
 static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                            const orb_align_options *options, orb_alignment *out) {

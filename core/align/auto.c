@@ -1,10 +1,10 @@
 /* Alignment without landmarks.
  *
  * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
- * (find/match.c), and the composed map goes to the targets of its match. Of two shapes, the next best match is tried
- * where that leads to no good map. Of more, pairs of the matches are pinned as landmarks where it leads to none, and
- * the map is composed with them held and then without them. The alignment of least energy is returned. The preset
- * `fast` searches for rotations of the given spheres only.
+ * (find/match.c), and the composed map goes to the targets of its match. If that gives no good map of two shapes, the
+ * next best match is tried. If it gives none of more shapes, pairs of the matches are pinned as landmarks, and the map
+ * is composed with the pairs held and then without them. The alignment of least energy is returned. The preset `fast`
+ * only searches for rotations of the given spheres.
  */
 #include <math.h>
 #include <string.h>
@@ -19,8 +19,8 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { LEAST_PAIRS = 3 };            /* that are pinned: two leave a rotation open */
-static const double MOST_COST = 1e9; /* of an alternative, where the best rough map does not bend the shapes at all */
+enum { LEAST_PAIRS = 3 };            /* least pairs that are pinned: two leave a rotation open */
+static const double MOST_COST = 1e9; /* of an alternative, if the best rough map does not bend the shapes at all */
 _Static_assert((int)ORB_MATCH_OTHERS <= (int)ORB_ALTERNATIVES_MAX, "all other maps fit");
 _Static_assert((int)ORB_MATCH_PAIRS <= (int)ORB_ALTERNATIVE_PAIRS, "all pairs fit");
 
@@ -95,7 +95,7 @@ static int is_unsplit(const orb_align_shape *shapes, const orb_alignment *a) {
   return 1;
 }
 
-/* Pins the shapes at the pairs of the matches, composes the map with them held and then without them. *held 0: the
+/* Pins the shapes at the pairs of the matches, composes the map with the pairs held and then without them. *held 0: the
  * pairs cannot be met on the meshes as they are, and `out` is empty. */
 static orb_status align_pairs(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                               const orb_align_options *options, orb_alignment *out, int *held) {
@@ -160,8 +160,8 @@ static void next_free(orb_context *ctx, next_match *next) {
 }
 
 /* Composes two shapes towards the next best match, unless the best one has led to a good map, or the next one is far
- * behind. A start from its targets is compared with that of the best match, which had the same effort; a walk with what
- * the best match has led to. */
+ * behind. A start from targets must beat the start of the best match, which had the same effort; a walk must beat the
+ * final map of the best match. */
 static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                             const orb_align_options *options, double energy, const orb_map_course *best,
                             next_match *next) {
@@ -188,8 +188,9 @@ static int next_is_better(const next_match *next, const orb_map_course *best) {
   return next->is_open && !next->course.is_beaten && next->course.bulk - 1 < ORB_FIND_OTHER_GAIN * (best->bulk - 1);
 }
 
-/* Makes the next best match the match: a twisted body can bend less when its limbs are swapped, and then only the map
- * shows the mistake. Since bend and map disagree, the match counts as unclear. */
+/* Makes the next best match the match. The best match can be wrong although it bends less, since a twisted body can
+ * bend less when its limbs are swapped; then only the map shows the mistake. Since bend and map disagree, the match
+ * counts as unclear. */
 static orb_status next_take(orb_context *ctx, matches *m, double poor, next_match *next, orb_alignment *alignment) {
   const double clear = fmax(0, 1 - next->alignment.energy / fmin(alignment->energy, poor));
   double *target = next->target;
@@ -205,7 +206,7 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
   return ORB_OK;
 }
 
-/* Where a match has led to no map, its pairs are pinned. */
+/* If a match has led to no map, its pairs are pinned. */
 static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                            const orb_align_options *options, orb_alignment *alignment) {
   orb_alignment other;
@@ -220,8 +221,8 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
   return ORB_OK;
 }
 
-/* Composes a rotated alignment towards the matches. Where that has led to no good map, goes on towards the next best
- * match of two shapes, or pins pairs of the matches of several. */
+/* Composes a rotated alignment towards the matches. If that leads to no good map, continues with the next best match of
+ * two shapes, or pins pairs of the matches of more. */
 static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, matches *m,
                                  const orb_align_options *options, orb_alignment *alignment) {
   const double poor = orb_map_params_of(options->preset).energy.poor;
@@ -260,8 +261,8 @@ static int32_t partner_of(const orb_mesh *mesh, const double *target, const doub
   return best;
 }
 
-/* The vertices that correspond if `other` is the map of shape s and the best maps are those of the others. Returns how
- * many; two pairs never share a vertex. `vertex`: as in matches. */
+/* Lists the vertices that correspond if `other` is the map of shape s and all other shapes keep their best maps.
+ * Returns how many; two pairs never share a vertex. `vertex`: as in matches. */
 static int32_t pairs_of_other(const orb_align_shape *shapes, const matches *m, int32_t s, const orb_match_other *other,
                               int32_t *vertex) {
   int32_t count = 0;
@@ -342,7 +343,7 @@ end:
   return status;
 }
 
-/* What a caller may know of the matches: how sure the best ones are, and the next ones. */
+/* Adds what a caller may know of the matches: how sure the best ones are, and the next ones. */
 static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                                    orb_alignment *out) {
   out->match.clear = m->clear;

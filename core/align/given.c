@@ -105,7 +105,7 @@ static void springs_free(orb_context *ctx, orb_map_springs *springs) {
   orb_free(ctx, springs->weight);
 }
 
-/* The springs between these vertices of the two shapes, one a landmark. */
+/* The springs between these vertices of the two shapes, one per landmark. */
 static void set_springs(const orb_landmark *landmarks, int32_t count, const int32_t *fixed, const int32_t *moving,
                         orb_map_springs *out) {
   out->count = 0;
@@ -118,7 +118,7 @@ static void set_springs(const orb_landmark *landmarks, int32_t count, const int3
   }
 }
 
-/* From here on the soft landmarks of a shape are not vertices that others share. */
+/* Makes the soft landmarks of a shape ordinary vertices, which no other shape shares. */
 static void free_landmarks(const orb_landmark *landmarks, int32_t count, orb_aligned_shape *shape) {
   for (int32_t l = 0; l < count; l++) {
     if (is_soft(&landmarks[l])) {
@@ -128,7 +128,7 @@ static void free_landmarks(const orb_landmark *landmarks, int32_t count, orb_ali
 }
 
 /* Soft landmarks say where to look, not where to end. They were pinned with the others, so that the map takes each limb
- * to its limb. Now the map is composed once more with them free, and a spring draws the places of each together. */
+ * to its limb. Now the map is composed once more with them free, and a spring pulls the places of each together. */
 static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, orb_preset preset, orb_alignment *alignment) {
   const int32_t count = alignment->landmark_count, soft = count_soft(landmarks, count);
   if (soft == 0 || alignment->shape_count < 2) {
@@ -215,8 +215,8 @@ static orb_status spread_landmarks(orb_context *ctx, const double *positions, in
   return ORB_OK;
 }
 
-/* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
- * partners, with all of them pinned. sure: as of the hint. *energy: INFINITY if there is no such match, or no such map.
+/* Composes the map to shape s with all landmarks pinned, towards a match that agrees with a few landmarks and takes all
+ * of them to their partners. sure: as in orb_match_hint. *energy: INFINITY if there is no such match, or no such map.
  */
 static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double sure,
                                 int keeps_angles, double *energy) {
@@ -294,7 +294,7 @@ end:
   return status;
 }
 
-/* A landmark walk of a pinned alignment of two shapes. *walked 0: it led to no map, or to none that is better. */
+/* A landmark walk of a pinned alignment of two shapes. *walked 0: it led to no map, or to no better one. */
 static orb_status improve_by_walk(orb_context *ctx, orb_preset preset, orb_alignment *a, int *walked) {
   const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK};
   double energies[2];
@@ -303,9 +303,9 @@ static orb_status improve_by_walk(orb_context *ctx, orb_preset preset, orb_align
   return ORB_OK;
 }
 
-/* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. Where it leads to no fair
- * map, a match may lead to one, even if the landmarks are less sure of one body. All other starts are for shapes
- * without either. *posed: whether `other` holds a posed alignment; cleared, since the better of the two is kept. */
+/* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a match
+ * may lead to a better one, even if the landmarks show one body less clearly. All other starts are for shapes for which
+ * neither works. *posed: whether `other` holds a posed alignment. The function clears it: it keeps the better one. */
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                           const orb_align_options *options, orb_alignment *other, int *posed, orb_alignment *a) {
   const orb_map_params params = orb_map_params_of(options->preset);
@@ -397,8 +397,8 @@ orb_status orb_align_pinned(orb_context *ctx, const orb_align_shape *shapes, int
   return align_and_compose(ctx, shapes, shape_count, landmarks, landmark_count, options, 0, out);
 }
 
-/* Refines the map of the copy of shape s, and puts the whole shape in the copy's place. *energy: INFINITY if there is
- * no map; both shapes then stay what they are. */
+/* Refines the map of the copy of shape s, and replaces the copy by the whole shape. *energy: INFINITY if there is no
+ * map; both shapes then stay as they are. */
 static orb_status lift_shape(orb_context *ctx, orb_copied_shape *copied, const orb_landmark *landmarks, int32_t s,
                              orb_preset preset, orb_alignment *alignment, double *energy) {
   const int32_t count = alignment->landmark_count;
@@ -424,7 +424,7 @@ end:
   return status;
 }
 
-/* The places of alternatives are at vertices of the copies, and come to lie at the same vertices of the whole shapes.
+/* The places of alternatives are at vertices of the copies. Moves them to the same vertices of the whole shapes.
  */
 static orb_status lift_alternatives(orb_context *ctx, const orb_copies *copies, orb_alignment *alignment) {
   for (int32_t i = 0; i < alignment->alternative_count; i++) {

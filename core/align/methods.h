@@ -1,18 +1,18 @@
 /* Alignment: embeddings of several shapes and their landmarks -> embeddings in which the landmarks coincide and nearby
  * points of the surfaces correspond.
  *
- * Comes in: meshes with certified embeddings, and landmarks as places on the meshes. Goes out: an orb_alignment, whose
- * shapes share one sphere and are all certified. docs/method.md describes the methods and docs/glossary.md the terms.
- * Read in this order; a file calls only files and folders before it:
+ * In: meshes with certified embeddings, and landmarks as places on the meshes. Out: an orb_alignment, whose shapes
+ * share one sphere and are all certified. docs/method.md describes the methods and docs/glossary.md the terms. Read in
+ * this order; a file calls only files and folders before it:
  *
  *   sheet/   the working copy of a shape, which can be refined, and landmarks as its vertices
  *   rotate/  method `rotate`: rotations of whole spheres, by landmarks or by search
  *   pin/     method `pin`: landmarks as constraints of the embeddings
  *   rbf/     method `rbf`: the warp of Peng & Timalsena 2016
  *   map/     the composed map, from one shape through the sphere to the other, and its optimiser
- *   find/    matches, without landmarks or such that agree with them; given landmarks that may be misplaced
+ *   find/    matches, without landmarks or in agreement with them; given landmarks that may be misplaced
  *            (find/suspects.h)
- *   given.c  one method with the given landmarks, then the composed map; soft landmarks are let go at the end
+ *   given.c  one method with the given landmarks, then the composed map; soft landmarks are released at the end
  *   auto.c   method `auto`: the rotation search, composed towards the matches of find/
  *   align.c  orb_align(): checks the request, chooses between given.c and auto.c, and aligns copies of large shapes
  *
@@ -30,19 +30,19 @@ ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shap
                                           const orb_landmark *landmarks, int32_t landmark_count,
                                           const orb_align_options *options, orb_alignment *out);
 
-/* The same with `pin` for pairs of a match that has led to no good map: neither a landmark walk alone nor the match is
- * tried again. */
+/* The same with `pin`, for pairs of a match that has led to no good map: tries neither a landmark walk alone nor the
+ * match again. */
 ORB_MUST_CHECK orb_status orb_align_pinned(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                            const orb_landmark *landmarks, int32_t landmark_count,
                                            const orb_align_options *options, orb_alignment *out);
 
-/* What the maps of all later shapes go to. */
+/* What the maps of all later shapes should reach. */
 typedef struct orb_aims {
   const double *const *targets; /* NULL, or for each shape but the first what orb_compose() takes */
   int keep_angles;              /* the spheres of the shapes do */
-  orb_map_beat beat;            /* as in orb_map_guide */
-  orb_map_course *course;       /* likewise; of the last shape */
-  int walks_first;              /* likewise */
+  orb_map_beat beat;            /* see orb_map_guide */
+  orb_map_course *course;       /* see orb_map_guide; that of the last shape */
+  int walks_first;              /* see orb_map_guide */
 } orb_aims;
 
 /* Improves the maps from the first shape to the others (orb_compose()), since aligned landmarks alone do not make a
@@ -55,10 +55,10 @@ ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *align
 ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                          const orb_align_options *options, orb_alignment *out);
 
-/* Takes an alignment of copies to the whole shapes. landmarks: the caller's, on the given meshes. The maps of the
+/* Extends an alignment of copies to the whole shapes. landmarks: the caller's, on the given meshes. The maps of the
  * copies are refined, and soft landmarks are held by their springs. The alternatives become places on the given meshes.
- * *lifted 0: a map folds at the level of its copy, and `alignment` is empty. `copies` is spent in any case; the caller
- * frees it. */
+ * *lifted 0: a map folds at the level of its copy, and `alignment` is empty. `copies` is used up in any case; the
+ * caller frees it. */
 ORB_MUST_CHECK orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks,
                                          orb_preset preset, orb_alignment *alignment, int *lifted);
 

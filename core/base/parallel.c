@@ -64,7 +64,7 @@ struct orb_pool {
   atomic_uint chunks;
   char apart_from_finished[CACHE_LINE];
   atomic_uint finished; /* chunks of this loop that workers have run */
-  atomic_uint wanted;   /* the caller sleeps until so many are finished; UINT32_MAX: it does not sleep */
+  atomic_uint wanted;   /* the caller sleeps until this many are finished; UINT32_MAX: it does not sleep */
   struct worker {
     orb_context *ctx;
     pthread_t thread;
@@ -273,7 +273,7 @@ static void hand_out(struct orb_pool *pool, const parallel_loop *loop, uint32_t 
   }
 }
 
-/* Waits until workers have finished so many chunks of the loop. */
+/* Waits until workers have finished this many chunks of the loop. */
 static void await(struct orb_pool *pool, uint32_t finished) {
   int spin = 0;
   while (spin < pool->spins && atomic_load_explicit(&pool->finished, memory_order_acquire) != finished) {

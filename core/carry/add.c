@@ -19,7 +19,7 @@ typedef struct adder {
   int64_t *corner;
   orb_added_set *sets;
   float **values;
-  uint16_t *joints; /* 4 a vertex, as the weights */
+  uint16_t *joints; /* 4 per vertex, as the weights */
   float *weights;
   double *before, *after, *area; /* of the surface of a skin */
   orb_baked *baked;              /* as many as textures, as the variants and images */

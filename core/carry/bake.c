@@ -29,7 +29,7 @@ typedef struct baker {
   const orb_texels *texels;
   int32_t side;
   int32_t *owner;       /* per texel: the triangle of the charts; −1: none */
-  unsigned char *rgba;  /* 4 a texel */
+  unsigned char *rgba;  /* 4 per texel */
   unsigned char *known; /* per texel */
   int64_t shared;
   double work; /* texels looked at since the last check for cancellation */

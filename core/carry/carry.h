@@ -27,7 +27,7 @@ typedef struct orb_carried_set {
 
 typedef struct orb_carrier {
   orb_carry_job job;
-  double *moved; /* 16 a shape, see orb_asset_transforms() */
+  double *moved; /* 16 per shape, see orb_asset_transforms() */
   int32_t set_count, set_capacity;
   orb_carried_set *sets;
   const int32_t **splits; /* set_count: see orb_asset_options */

@@ -16,7 +16,7 @@ ORB_MUST_CHECK orb_status orb_corner_blends_create(orb_context *ctx, const orb_m
                                                    const orb_aligned_shape *shape, const int32_t *corners,
                                                    orb_corner_blend **out);
 
-/* Blends `width` floats a vertex of the file into `width` a corner. */
+/* Blends `width` floats per vertex of the file into `width` per corner. */
 void orb_corner_blends_apply(const orb_corner_blend *blends, int64_t count, const float *values, int32_t width,
                              float *out);
 

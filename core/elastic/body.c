@@ -45,7 +45,7 @@ static double half_cotangent(const orb_mesh *mesh, size_t h) {
   return fmin(MOST_WEIGHT, fmax(LEAST_WEIGHT, value));
 }
 
-/* Lists the edges at each vertex. filled: room for a number a vertex, zeroed. */
+/* Lists the edges at each vertex. filled: room for a number per vertex, zeroed. */
 static void list_edges(orb_body *b, int32_t *filled) {
   const orb_mesh *mesh = b->mesh;
   size_t h = 3 * (size_t)mesh->triangle_count;

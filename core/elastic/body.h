@@ -7,7 +7,7 @@
 typedef struct orb_body {
   const orb_mesh *mesh; /* borrowed */
   int32_t count;        /* vertices */
-  double *normal;       /* unit, weighted by area; 3 a vertex */
+  double *normal;       /* unit, weighted by area; 3 per vertex */
   double *mass;         /* a third of the area of the triangles around each vertex */
   orb_searched searched;
   /* The edges of vertex v are start[v] … start[v + 1] − 1, each twice: once for each triangle beside it. */
@@ -19,7 +19,7 @@ typedef struct orb_body {
 ORB_MUST_CHECK orb_status orb_body_create(orb_context *ctx, const orb_mesh *mesh, orb_body *out);
 void orb_body_free(orb_context *ctx, orb_body *body);
 
-/* Unit normals of the mesh at these positions (3 a vertex). mass may be NULL. */
+/* Unit normals of the mesh at these positions (3 per vertex). mass may be NULL. */
 void orb_body_normals(const orb_mesh *mesh, const double *position, double *normal, double *mass);
 
 #endif

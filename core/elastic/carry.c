@@ -9,7 +9,7 @@
 
 enum { GRAIN = 128 }; /* points of one task */
 
-/* Where one point goes: the mean, by barycentric coordinates, of what the corners of its place make of it. */
+/* Carries one point: each corner of its place rotates and shifts it, and the coordinates blend the three. */
 static void carry_point(const orb_mesh *coarse, const orb_elastic_pose *pose, const orb_place *place, const double p[3],
                         double out[3]) {
   memset(out, 0, sizeof(double[3]));

@@ -1,7 +1,7 @@
-/* A round adds up pulls on the vertices of mesh a: of the rough map, and of the nearest places both ways. Then
- * rotations and positions take turns: each vertex takes the rotation that fits its edges best, and all positions
- * together solve a linear system in which each edge should be what these rotations make of it. The pulls grow stronger
- * from round to round.
+/* A round adds up pulls on the vertices of mesh a: from the rough map, and from the nearest places both ways. Then
+ * rotations and positions take turns. Each vertex takes the rotation that fits its edges best. Then all positions
+ * together solve a linear system that asks each edge to equal the given edge under the rotations of its ends. The pulls
+ * grow stronger from round to round.
  *
  * The first rotations come from the rough map: how it rotates the surroundings of each vertex. If they came from the
  * rotation of the whole instead, an arm raised by 150° would stay twisted, since neighbouring rotations hold each
@@ -35,10 +35,11 @@ enum {
   SETTLE_ROUNDS = 3, /* of a pose that is near already; 6 come no nearer to the truth */
   SLIDE_ROUNDS = 10, /* 15 come nearer to the truth by a fiftieth */
   TURNS = 2,         /* of rotations and positions in a round */
-  SURROUNDINGS = 4,  /* one vertex in so many is nearest to a vertex, and their images give its first rotation. With one
-                        in 16, a limb's girth and as much of its length, noise of the rough map stays as twists: of 20
-                        pairs, the right map then bends the shapes least in 17 instead of 19, and by a tenth more */
-  GRAIN = 128        /* vertices of one task */
+  SURROUNDINGS = 4, /* a vertex takes its first rotation from the images of its surroundings, one vertex in this many of
+                       the mesh. With one in 16, a limb's girth and as much of its length, noise of the rough map stays
+                       as twists: of 20 pairs, the right map then bends the shapes least in 17 instead of 19, and by a
+                       tenth more */
+  GRAIN = 128       /* vertices of one task */
 };
 /* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
 static const double MAP_REACH = 0.6, FIRST_REACH = 0.6, LAST_REACH = 0.06;
@@ -46,17 +47,17 @@ static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
 /* A longer first one lets people slide nearer to the truth, and animals of other proportions away from it. */
 static const double SLIDE_FIRST_REACH = 0.3, SLIDE_LAST_REACH = 0.06;
 static const double AHEAD = 0.8; /* of the way of the last round: how far ahead a slide looks */
-/* The rough map goes on to pull beside the places, with this share of its strength at first and nothing from FADED of
- * the rounds on: without it a limb slides to the nearest other one. */
+/* The rough map keeps pulling beside the places, with this share of its strength at first, and not at all after FADED
+ * of the rounds: without it a limb slides to the nearest other one. */
 static const double MAP_SHARE = 0.3, FADED = 0.7;
 /* Distances at which a vertex of the rough map is an outlier and counts a quarter: at first, in the first rounds, and
  * beside places. */
 static const double OUTLIER_FIRST = 10, OUTLIER_MAP = 0.6, OUTLIER_PLACE = 0.4;
 static const double NORMAL_SHARE = 0.05; /* of normals beside positions in a first rotation: a limb is nearly a line */
 static const double FACING = 0.2;        /* least cosine of two normals: with less the place does not pull */
-static const double HELD = 0.2; /* weight with which such a vertex is held where it looks from, relative to a pull */
-static const double PLANE_MOST = 0.1;      /* most that a place slides from a vertex within its tangent plane */
-static const double ANCHORED = 10;         /* pull of an anchor, relative to the edges of its vertex */
+static const double HELD = 0.2;          /* weight that holds such a vertex where it looks from, relative to a pull */
+static const double PLANE_MOST = 0.1;    /* most that a place slides from a vertex within its tangent plane */
+static const double ANCHORED = 10;       /* pull of an anchor, relative to the edges of its vertex */
 static const double LEAST_DIAGONAL = 1e-9; /* keeps the matrix regular where nothing pulls */
 
 typedef struct registration {
@@ -110,7 +111,7 @@ static void fit_surroundings(registration *r) {
   }
 }
 
-/* What the surroundings of both ends make of the edge that arrives at v, summed over its edges. */
+/* Sums, over the edges that arrive at v, what the surroundings of both ends make of each given edge. */
 static void add_edges(const registration *r, int32_t v, double sum[3]) {
   const orb_body *a = &r->a;
   const double *linear = r->stretch ? r->stretch->linear : r->pose->rotation, *here = linear + 9 * (size_t)v;
@@ -161,7 +162,7 @@ static void add_pull(registration *r, int32_t v, const double target[3], double 
   }
 }
 
-/* The point beside the vertex turns with its surroundings. */
+/* The point beside the vertex rotates with the vertex's surroundings. */
 static void pull_by_anchors(registration *r) {
   for (int32_t i = 0; r->anchors && i < r->anchors->count; i++) {
     const orb_elastic_anchor *one = &r->anchors->one[i];
@@ -255,7 +256,7 @@ static void pull_by_place(registration *r, double weight) {
   }
 }
 
-/* The vertices around v, nearest rings first: `most` of them, if there are as many. mark: a number a vertex. */
+/* The vertices around v, nearest rings first: `most` of them, if there are as many. mark: a number per vertex. */
 static int32_t list_surroundings(const orb_body *a, int32_t v, int32_t most, int32_t *mark, int32_t *list) {
   int32_t count = 1;
   list[0] = v;
@@ -296,7 +297,7 @@ static void rotation_of_map(const registration *r, const int32_t *list, int32_t 
   (void)orb_nearest_rotation(h, rotation);
 }
 
-/* The pose that the rough map gives at once. */
+/* Sets the pose that the rough map gives directly. */
 static orb_status begin_from_map(registration *r) {
   const int32_t n = r->a.count, most = 1 + n / SURROUNDINGS;
   int32_t *list = ORB_NEW(r->ctx, int32_t, most), *mark = ORB_NEW0(r->ctx, int32_t, n);
@@ -441,7 +442,7 @@ end:
   return status;
 }
 
-/* What a slide needs beside what a registration has. */
+/* Prepares what a slide needs besides a registration. */
 static orb_status prepare_slide(registration *r, orb_stretch *stretch) {
   const size_t n = 3 * (size_t)r->a.count;
   ORB_TRY(orb_stretch_create(r->ctx, &r->a, stretch));

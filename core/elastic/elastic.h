@@ -32,7 +32,7 @@ typedef struct orb_elastic_anchor {
   double place[3];  /* where the point belongs */
 } orb_elastic_anchor;
 
-/* A pointer to them may be NULL: none. */
+/* A NULL pointer to them means none. */
 typedef struct orb_elastic_anchors {
   int32_t count;
   const orb_elastic_anchor *one;
@@ -40,8 +40,8 @@ typedef struct orb_elastic_anchors {
 
 /* Where the first mesh is. The caller owns both. */
 typedef struct orb_elastic_pose {
-  double *position; /* 3 a vertex */
-  double *rotation; /* 9 a vertex, row-major: of its surroundings, from the mesh as given */
+  double *position; /* 3 per vertex */
+  double *rotation; /* 9 per vertex, row-major: of its surroundings, from the mesh as given */
 } orb_elastic_pose;
 
 /* Moves mesh a to mesh b along a rough map, then to the nearest places, and its anchors, if any, to theirs. Both meshes
@@ -60,7 +60,7 @@ ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a
 
 /* Slides mesh a over mesh b until the two fit each other in space, from where a map takes its vertices. A map of little
  * energy knows lengths only; a slide knows bumps and hollows as well. Both meshes are as in orb_elastic_register().
- * Changes the positions, 3 a vertex. O(n · m) a round, 10 rounds. On all threads. */
+ * Changes the positions, 3 per vertex. O(n · m) a round, 10 rounds. On all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_slide(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                             const orb_elastic_anchors *anchors, double *position);
 

@@ -6,9 +6,9 @@
 #include "base/memory.h"
 #include "numeric/clones.h"
 
-/* Vertices of a block: two vectors of floats, and few of the blocks are near. Boxes of a row, which are measured at
- * once: those of a copy of 1,000 vertices, which is searched most. Groups of a row: those that one vector holds side by
- * side. */
+/* BLOCK: vertices of a block, two vectors of floats; few of the blocks are near. ROW: boxes that are measured at once,
+ * as many as a copy of 1,000 vertices has, which is searched most. GROUPS: groups of a row, as many as one vector holds
+ * side by side. */
 enum { BLOCK = 16, ROW = 64, GROUPS = 16, COORDINATES = 6 };
 
 static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|² against |x − x'|², areas being 4π */
@@ -210,7 +210,7 @@ ORB_CLONES static void measure_boxes(const float *box, int32_t boxes, const floa
   memcpy(out->box, sum, sizeof sum);
 }
 
-/* Of the vertices of a block, and of the best one before. */
+/* Updates the nearest vertex so far by those of a block. */
 static void look_at_block(const orb_searched *s, int32_t block, const float q[COORDINATES], float *least,
                           int32_t *best) {
   float distance[BLOCK];

@@ -8,7 +8,7 @@
 typedef struct orb_searched {
   int32_t count;
   int32_t columns; /* the vertices, up to full blocks */
-  int32_t boxes;   /* one a block, up to a full row of them */
+  int32_t boxes;   /* one per block, up to a full row of them */
   int32_t *order;  /* the vertex of each column */
   int32_t *column; /* of each vertex */
   float *at;       /* six rows of columns: positions and weighted normals. The last ones lie at infinity */
@@ -25,9 +25,9 @@ void orb_searched_free(orb_context *ctx, orb_searched *searched);
 /* Lays out the vertices, where they are now and as they face. O(n). */
 void orb_searched_fill(const double *position, const double *normal, orb_searched *out);
 
-/* The vertex nearest in position and half-weighted normal. hint: a vertex that is near, as the result for a point
- * beside this one, or −1; it makes the search short, and decides where several vertices are equally near. O(n), by
- * vectors, but of a thousandth: the boxes around 64 blocks are measured, and few blocks in them are near. */
+/* The vertex nearest in position and half-weighted normal. hint: a vertex that is near, for example the result for a
+ * point beside this one, or −1. It makes the search short, and is the result if no other vertex is nearer. Measures the
+ * boxes around 64 blocks each, a thousandth of n; few of them are near. O(n). */
 int32_t orb_searched_nearest(const orb_searched *searched, const double position[3], const double normal[3],
                              int32_t hint);
 

@@ -17,7 +17,8 @@ enum {
   ROUNDS_LEAST = 4,
   ROUNDS_MOST = 40
 };
-/* Of the mean stretch, against the moments. Less lets noise stretch thin limbs, more keeps girths from changing. */
+/* Weight of the mean stretch against the moments. With less, noise stretches thin limbs; with more, girths cannot
+ * change. */
 static const double MEAN_SHARE = 0.2;
 
 typedef struct fitting {

@@ -23,8 +23,8 @@ typedef struct orb_corner {
 typedef struct orb_build {
   orb_context *ctx;
   int64_t max_triangles;
-  double *positions; /* 3 a vertex */
-  float *colors;     /* 4 a vertex, as in the file; NULL: none */
+  double *positions; /* 3 per vertex */
+  float *colors;     /* 4 per vertex, as in the file; NULL: none */
   float *normals;    /* 3 a normal */
   float *texcoords;  /* 2 a texture coordinate, v up unless texcoords_v_down */
   int64_t vertices, vertex_room, color_room, normal_count, normal_room, texcoord_count, texcoord_room;

@@ -18,7 +18,7 @@ typedef struct orb_given_file {
 
 enum { ORB_GIVEN_SETS = 8 }; /* of colours, of texture coordinates: sets of higher numbers are not read */
 
-/* Sets of colours (4 numbers a vertex; white where a primitive has none) or texture coordinates (2; zeros). A set
+/* Sets of colours (4 numbers per vertex; white where a primitive has none) or texture coordinates (2; zeros). A set
  * counts if a vertex that counts has it. */
 typedef struct orb_given_sets {
   int32_t count, width;
@@ -48,7 +48,7 @@ void orb_given_skin_free(orb_context *ctx, orb_given_skin *skin);
 typedef struct orb_given_targets {
   int32_t count;
   char (*names)[ORB_NAME_MAX];
-  float **moves; /* 3 a vertex, in the coordinates of the scene; zeros where a mesh does not have the target */
+  float **moves; /* 3 per vertex, in the coordinates of the scene; zeros where a mesh does not have the target */
 } orb_given_targets;
 /* Free also after an error. */
 ORB_MUST_CHECK orb_status orb_given_targets_read(orb_context *ctx, const orb_given_file *file, orb_given_targets *out);
@@ -58,9 +58,9 @@ void orb_given_targets_free(orb_context *ctx, orb_given_targets *targets);
  * that the base colour texture of their material uses, else the first. Those of strips and fans are omitted. */
 typedef struct orb_given_charts {
   int32_t triangle_count, vertex_count;
-  int32_t *triangles; /* 3 a triangle */
+  int32_t *triangles; /* 3 per triangle */
   int32_t *material;  /* of each triangle; −1: none */
-  float *uv;          /* 2 a vertex */
+  float *uv;          /* 2 per vertex */
   unsigned char *has; /* of each vertex: whether it has texture coordinates */
 } orb_given_charts;
 /* Free also after an error. */

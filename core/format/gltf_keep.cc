@@ -12,7 +12,7 @@
 
 extern "C" {
 #include "mesh/dropped.h"
-#include "numeric/turn.h"
+#include "numeric/rotate_along.h"
 }
 
 namespace gltf {
@@ -69,7 +69,7 @@ struct Keeper {
   std::vector<int32_t> first;  /* per mesh: the number of its first vertex */
   std::vector<int32_t> showed; /* how often the scene shows it */
   std::vector<Matrix> matrix;
-  std::map<size_t, int64_t> zeros; /* accessors of so many vertices that stay */
+  std::map<size_t, int64_t> zeros; /* accessors of this many vertices that stay */
   Widened widened;
 
   Keeper(orb_context *context, cJSON *document, const orb_gltf_shapes &given, orb_gltf_kept *facts)
@@ -229,14 +229,14 @@ struct Keeper {
     return out;
   }
 
-  /* How normals (width 3) or tangents (4) turn with the surface: by the shortest rotation of its smooth normal. */
-  Floats turns(size_t mesh, int64_t from, size_t count, const Frame &frame, int32_t target, const Numbers &values,
-               size_t width) const {
+  /* How normals (width 3) or tangents (4) rotate with the surface: by the shortest rotation of its smooth normal. */
+  Floats rotated_values(size_t mesh, int64_t from, size_t count, const Frame &frame, int32_t target,
+                        const Numbers &values, size_t width) const {
     Floats out = room(count);
     for (size_t i = 0; i < count; i++) {
       int64_t at = 3 * static_cast<int64_t>(shapes.on_surface[from + static_cast<int64_t>(i)]);
       const double *value = &values[width * i];
-      double length = orb_length(value), seen[3], turned[3], local[3];
+      double length = orb_length(value), seen[3], rotated[3], local[3];
       if (at < 0 || !(length > 0)) {
         continue;
       }
@@ -249,11 +249,11 @@ struct Keeper {
       } else {
         multiply(frame.to, value, seen);
       }
-      orb_turn(before, after, seen, turned);
+      orb_rotate_along(before, after, seen, rotated);
       if (width == 3) {
-        multiply_transposed(frame.to, turned, local);
+        multiply_transposed(frame.to, rotated, local);
       } else {
-        multiply(frame.back, turned, local);
+        multiply(frame.back, rotated, local);
       }
       orb_normalize(local);
       for (int k = 0; k < 3; k++) {
@@ -283,12 +283,12 @@ struct Keeper {
           moves_it ? editor->add(moves(mesh, from, count, frame, k), 3, true, true) : zero_target(editor, count);
       set(target, "POSITION", static_cast<double>(position));
       if (!normal.empty()) {
-        Floats turned = turns(mesh, from, count, frame, k, normal, 3);
-        set(target, "NORMAL", static_cast<double>(editor->add(turned, 3, true, false)));
+        Floats rotated = rotated_values(mesh, from, count, frame, k, normal, 3);
+        set(target, "NORMAL", static_cast<double>(editor->add(rotated, 3, true, false)));
       }
       if (!tangent.empty()) {
-        Floats turned = turns(mesh, from, count, frame, k, tangent, 4);
-        set(target, "TANGENT", static_cast<double>(editor->add(turned, 3, true, false)));
+        Floats rotated = rotated_values(mesh, from, count, frame, k, tangent, 4);
+        set(target, "TANGENT", static_cast<double>(editor->add(rotated, 3, true, false)));
       }
     }
     int32_t attributes = 1 + !normal.empty() + !tangent.empty();

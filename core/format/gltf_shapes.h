@@ -9,7 +9,7 @@ typedef struct orb_gltf_shapes {
   int32_t target_count, file_vertex_count;
   const char *const *names;       /* target_count */
   const int32_t *on_surface;      /* per vertex of the file, as orb_mesh_read() numbers them; −1: it stays */
-  const double *const *positions; /* target_count + 1 lists, 3 a vertex of the surface; first those of the document */
+  const double *const *positions; /* target_count + 1 lists, 3 per vertex of the surface; first those of the document */
   const double *const *normals;   /* likewise, unit or zero; NULL: targets get no normals */
   int32_t key_count;              /* of the animation "morph"; 0: none */
   const int32_t *key_frames;      /* key_count: 0: the document's shape, k: target k − 1 */

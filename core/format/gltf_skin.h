@@ -9,7 +9,7 @@
  * asset. */
 typedef struct orb_skin_surface {
   int32_t count;                /* of its vertices; 0: the skeleton stays as it is */
-  const double *before, *after; /* 3 a vertex: on the shape, on the base */
+  const double *before, *after; /* 3 per vertex: on the shape, on the base */
   const double *area;           /* of each vertex: the area of the base that it stands for */
   const uint16_t (*joints)[4];
   const float (*weights)[4]; /* the sum is 1 */
@@ -21,7 +21,7 @@ typedef struct orb_added_skin {
   size_t size;
   int32_t skin, joint_count;
   double place[16], moved[16]; /* from its meshes to its scene, and from there to the asset; column-major */
-  const uint16_t *joints;      /* 4 a vertex of all triangle primitives */
+  const uint16_t *joints;      /* 4 per vertex of all triangle primitives */
   const float *weights;        /* likewise; the sum is 1 */
   orb_skin_surface surface;
 } orb_added_skin;

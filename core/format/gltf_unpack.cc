@@ -43,7 +43,7 @@ struct Unpacker {
     return cJSON_GetArrayItem(member(doc, list), static_cast<int>(index));
   }
 
-  /* The values as components of a type, `stride` bytes an element. */
+  /* The values as components of a type, `stride` bytes per element. */
   Packed::Octets bytes_of(const Packed::Values &values, int64_t type, bool normalized, size_t stride) const {
     const size_t size = static_cast<size_t>(component_size(type));
     const double most = component_most(type), least = type == 5120 || type == 5122 ? -most - 1 : 0;

@@ -125,7 +125,7 @@ static void on_jpeg_progress(j_common_ptr info) {
   }
 }
 
-/* From three bytes a pixel to four, in place. */
+/* From three bytes per pixel to four, in place. */
 static void widen_row(unsigned char *row, size_t width) {
   for (size_t x = width; x-- > 0;) {
     unsigned char rgb[3];

@@ -29,7 +29,7 @@ _Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 128, "write and r
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
                "write and read the new member");
 
-/* One array of a mesh with a fixed number of bytes a triangle. */
+/* One array of a mesh with a fixed number of bytes per triangle. */
 typedef struct column {
   void *data; /* NULL: the mesh has none */
   size_t size;

@@ -91,7 +91,7 @@ static void join_parts(const marking *m) {
   }
 }
 
-/* Puts the parts of the largest shares into out, and gives each its number by its root. share: 2 a vertex, 0. */
+/* Puts the parts of the largest shares into out, and gives each its number by its root. share: 2 per vertex, 0. */
 static void choose_parts(const marking *m, double *share, orb_warning *out) {
   double sum[2] = {0, 0};
   for (int32_t t = 0; t < m->pair->triangle_count; t++) {

@@ -8,7 +8,7 @@
 typedef struct orb_warn_pair {
   const int32_t *triangles;
   int32_t triangle_count, vertex_count;
-  const double *position[2]; /* 3 a vertex */
+  const double *position[2]; /* 3 per vertex */
   const double *move[2];     /* 4×4, column-major: similarities that lay the shapes onto each other; only for thin */
 } orb_warn_pair;
 

@@ -18,7 +18,8 @@ static int32_t root_of(int32_t *root, int32_t i) {
   return i;
 }
 
-/* Joins the sets of a and b; 0 where they are one already. The lesser root stays, so the result is that of any order.
+/* Joins the sets of a and b. Returns 0 if they are one already. The lesser root stays, so the result does not depend on
+ * the order.
  */
 static int join(int32_t *root, int32_t a, int32_t b) {
   a = root_of(root, a);

@@ -4,8 +4,9 @@
 
 #include "mesh/cycles.h"
 
-/* Keeps as many cycles as the surface stays connected under: drops others, long ones first. The cycles are simple,
- * shortest first, and share no vertex; the surface is closed and in one piece. O(F + total length). */
+/* Keeps as many cycles as possible such that a cut along all of them leaves the surface connected; drops the longest
+ * first. The cycles are simple, shortest first, and share no vertex; the surface is closed and in one piece. O(F +
+ * total length). */
 ORB_MUST_CHECK orb_status orb_cycles_apart(orb_surface *surface, orb_cycles *cycles);
 
 #endif

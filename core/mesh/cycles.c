@@ -24,7 +24,7 @@
 
 /* Searches without a limit cover the whole surface: this many vertices in all, and WHOLE_LEAST searches at least. */
 enum { WHOLE_VERTICES = 4000000, WHOLE_LEAST = 8 };
-/* The searches near generators settle so many vertices in all, and each NEAR_LEAST at least: about a second's work at
+/* The searches near generators settle this many vertices in all, and at least NEAR_LEAST each: about a second's work at
  * most, which finds loops of some ten edges. */
 enum { NEAR_VERTICES = 6000000, NEAR_LEAST = 64 };
 enum { GENERATORS_MOST = 16000000 }; /* edges of all generators that are kept beside those searches: 64 MB */
@@ -237,7 +237,7 @@ static int32_t before(const work *w, int32_t v) {
   return w->p.parent[v] < 0 ? -1 : orb_dijkstra_origin(&w->p, w->p.parent[v]);
 }
 
-/* Where the paths to two settled vertices meet: takes steps on both by turns, O(the longer way to there). */
+/* The vertex where the paths to two settled vertices meet. Steps along both in turn, O(the longer way to there). */
 static int32_t meeting_of(work *w, int32_t a, int32_t b) {
   int32_t at = a, other = b;
   while (at < 0 || w->p.state[at] != ORB_DIJKSTRA_MARKED) {
@@ -380,8 +380,8 @@ static int is_free(const work *w, const orb_cycle *cycle, const unsigned char *t
   return 1;
 }
 
-/* Chooses cycles that share no vertex, shortest first, and moves the result to `out`. independent: only those whose
- * labels are, which have 64 bits, so that 64 cycles are chosen at most. */
+/* Chooses cycles that share no vertex, shortest first, and moves the result to `out`. independent: only cycles whose
+ * labels are independent; labels have 64 bits, so 64 cycles at most. */
 static orb_status choose(work *w, int32_t most, int independent, orb_cycles *out) {
   orb_context *ctx = w->p.s->ctx;
   uint64_t basis[64] = {0};

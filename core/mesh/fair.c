@@ -113,7 +113,7 @@ static void group(plate *p) {
   p->start[rows] = p->count = kept;
 }
 
-/* Solves for the least sum of squared Laplacians, each divided by its area. x: 3 a vertex inside. */
+/* Solves for the least sum of squared Laplacians, each divided by its area. x: 3 per vertex inside. */
 static orb_status solve(plate *p, double *x) {
   const int32_t rim = p->patch->rim, rows = p->patch->vertex_count, unknowns = rows - rim;
   int64_t count = 0, pairs = 0;

@@ -23,8 +23,8 @@
 
 enum { SMALL = 48 }; /* edges; least area takes O(edges³) time and the tables below O(SMALL²) memory */
 
-/* Triangles of fair surfaces: for each edge of their rim (a disc needs about 11 at the patch's growth, a rim with short
- * edges more), and in all. Those are solved in about three seconds. */
+/* Most triangles of fair surfaces: for each edge of their rim (a disc needs about 11 at the patch's growth, a rim with
+ * short edges more), and in all, which takes about three seconds to solve. */
 enum { FAIR_AN_EDGE = 24, FAIR_LEAST = 4, FAIR_MOST = 131072 };
 /* How often a patch is refined and made fair: the fair surface is larger than the flat one, and its shape depends a
  * little on the triangles that it starts from. */
@@ -159,7 +159,7 @@ static void close_with_fan(fill *f, int32_t count) {
 /* Adds the patch to the mesh. */
 static orb_status add_patch(fill *f, const orb_patch *patch) {
   orb_mesh *mesh = f->s->mesh;
-  const int32_t first = mesh->vertex_count - patch->rim; /* of the mesh: the patch's vertex 0, had its rim been new */
+  const int32_t first = mesh->vertex_count - patch->rim; /* mesh number of patch vertex 0, if its rim were new */
   if (patch->triangle_count + f->later > INT32_MAX - mesh->triangle_count) {
     return orb_fail(f->s->ctx, ORB_E_TOO_LARGE,
                     "The mesh would be too large with its holes filled; decimate it first.");
@@ -227,7 +227,7 @@ static int32_t collect_loop(fill *f, int32_t h, unsigned char *seen) {
   return count;
 }
 
-/* fans: for loops that are closed flat. *loops: how many; counted again. */
+/* fans: whether loops that are closed flat get fans. *loops: their number, counted anew. */
 static orb_status close_all(fill *f, orb_fill how, int fans, int64_t *loops) {
   orb_surface *s = f->s;
   int32_t half_edges = 3 * s->mesh->triangle_count; /* of the old faces */

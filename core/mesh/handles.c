@@ -26,7 +26,7 @@
 
 /* Short loops are cheaper to find: searches begin with an eighth of the limit, and double it. */
 static const double FIRST_LIMIT = 0.125;
-/* Rounds in which loops are searched that an error shows; each costs some searches of the whole surface. */
+/* Rounds that search for the loops to list in an error; each costs some searches of the whole surface. */
 enum { LIST_ROUNDS = 24 };
 /* A round of whole searches finds 64 loops at most. Of more handles than this, each round finds as many
  * short ones as share no vertex; plates, lattices and balls with tubes took one to seven rounds. */
@@ -121,8 +121,8 @@ static orb_status note_loop(orb_surface *s, const orb_cycles *cycles, int32_t i,
   return ORB_OK;
 }
 
-/* Gives the faces on the left of a loop vertices of their own, for which there is room. number: of the loop, for each
- * vertex, −1: in none. */
+/* Gives the faces on the left of a loop their own copies of its vertices; the mesh has room for them. number: of the
+ * loop, for each vertex, −1: in none. */
 static void split(orb_surface *s, const int32_t *loop, int32_t count, int32_t number, int32_t *of) {
   orb_mesh *mesh = s->mesh;
   int32_t first = mesh->vertex_count;

@@ -23,7 +23,7 @@ enum {
   LEVELS = 11,       /* 8¹¹ > 2³¹ triangles */
   STACK = 8 * LEVELS /* a level leaves at most seven nodes on the stack */
 };
-/* Of the histogram that finds a median: more bins need fewer rounds over many triangles, and more time for few. */
+/* Bins of the histogram that finds a median: more need fewer rounds over many triangles, but more time for few. */
 enum { BINS = 64 };
 /* In units of the extent. A float near 1 is rounded by 3e-8; boxes are widened by four times that, and a query's
  * coordinates, which may be far from 1, are shifted by four times theirs. */
@@ -41,7 +41,7 @@ typedef struct node {
 
 struct orb_nearest {
   node *nodes;     /* level by level, leaves first, the root last */
-  double *corners; /* 9 an entry */
+  double *corners; /* 9 per entry */
   int32_t *triangle;
   int32_t node_count, leaf_count, triangle_count;
   double origin[3], scale; /* box coordinates: (x − origin) · scale */

@@ -10,14 +10,15 @@
 #include "mesh/edges.h"
 #include "numeric/vec3.h"
 
-/* By how much the wanted edge length grows, as a share of the distance: a fifth of an edge for each edge inwards. Edges
- * of one length all over would be rim² / 12 triangles. */
+/* How fast the wanted edge length grows with the distance from the rim: by a fifth of an edge for each edge inwards.
+ * Edges of one length everywhere would make rim² / 12 triangles. */
 static const double GROWTH = 0.2;
 /* An edge this many times as long as wanted is split. Both halves are then nearer to the wanted length. */
 static const double LONG = 4.0 / 3;
-/* The shortest wanted length, as a share of the mean edge of the rim: vertices that nearly coincide ask for no more. */
+/* The shortest wanted length, as a share of the mean edge of the rim: vertices that nearly coincide would ask for less.
+ */
 static const double SHORTEST = 0.1;
-/* Opposite angles whose cotangents add up to less: the edge is flipped. Below 0 by the rounding of exact ties. */
+/* An edge is flipped if the cotangents of its opposite angles add up to less. Below 0 by the rounding of exact ties. */
 static const double DELAUNAY = -1e-6;
 static const double COTANGENT = 20; /* of 2.9 degrees */
 
@@ -143,8 +144,8 @@ static void split(orb_patch *p, int32_t h) {
   pair(p, 3 * w + 2, db);
 }
 
-/* Whether an edge joins the origin of h to v. Walks around the origin: to the one side, and where the rim ends that, to
- * the other. */
+/* Whether an edge joins the origin of h to v. Walks around the origin one way and, if the rim ends that walk, the other
+ * way. */
 static int is_edge(const orb_patch *p, int32_t h, int32_t v) {
   int32_t g = h;
   do {

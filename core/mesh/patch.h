@@ -8,7 +8,7 @@ typedef struct orb_patch {
   int32_t rim; /* vertices 0 … rim − 1 are those of the rim, in the order of the triangles */
   int32_t vertex_count, triangle_count;
   int32_t vertex_room, triangle_room;
-  double *positions; /* 3 a vertex; the rim lies in the unit ball */
+  double *positions; /* 3 per vertex; the rim lies in the unit ball */
   double *size;      /* the edge length wanted at each vertex */
   int32_t *like;     /* of each vertex: a vertex of the rim that is near */
   int32_t *triangles, *twin;

@@ -3,9 +3,8 @@
  * A quadrangle is cut along a diagonal that leaves both halves facing the same way; of two such diagonals, along the
  * shorter. Larger polygons lose ear after ear, never two neighbours in one round, which cuts a convex polygon into few
  * slivers. The search for points inside an ear has a budget that is linear in the number of corners, of this polygon
- * and of all polygons that share the scratch. When it is spent,
- * or when a polygon crosses itself so that no ear is left, the rest becomes a fan: the result always has count − 2
- * triangles over the given corners.
+ * and of all polygons that share the scratch. When it is spent, or when a polygon crosses itself so that no ear is
+ * left, the rest becomes a fan. So the result always has count − 2 triangles over the given corners.
  */
 #include "mesh/polygon.h"
 

@@ -90,8 +90,8 @@ orb_status orb_refuse_facing(orb_surface *s) {
   orb_status status =
       s->conflict >= 0
           ? orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
-                     "The surface has one side only, like a Möbius strip: no facing suits all of its faces. "
-                     "A walk from neighbour to neighbour returns reversed at the edge given. Cut the surface there, "
+                     "The surface has only one side, like a Möbius strip: its faces cannot be oriented consistently. "
+                     "A walk from neighbour to neighbour returns reversed at the given edge. Cut the surface there, "
                      "and close it.")
           : orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
                      "Faces are reversed against their neighbours at %lld %s; send the mesh with repair=safe, or "

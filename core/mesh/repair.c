@@ -1,8 +1,8 @@
 /* Repair and diagnosis.
  *
  * Problems are reported in the order in which the owner has to solve them: edges of three faces (such a surface has no
- * facing, holes or handles to speak of), a facing that cannot be made consistent, holes, vertices where fans touch,
- * pieces, handles, too few faces. With `safe` each repair comes just before the diagnosis that it can avert.
+ * orientation, holes or handles to speak of), an orientation that cannot be made consistent, holes, vertices where fans
+ * touch, pieces, handles, too few faces. With `safe` each repair comes just before the diagnosis that it can avert.
  *
  * A vertex where fans touch is split unless that takes the mesh apart. Two bodies that are joined at one vertex are
  * refused as not manifold there, with the sizes of both, rather than as two pieces.
@@ -136,7 +136,7 @@ static void reverse_flagged(orb_mesh *mesh, const unsigned char *flag, unsigned 
   }
 }
 
-/* Makes the facing consistent. *reversed: the flags of what had to be reversed, for face_outward(); NULL: nothing. */
+/* Orients the faces consistently. *reversed: flags of the faces that it reversed, for face_outward(); NULL: none. */
 static orb_status make_consistent(orb_surface *s, unsigned repair, unsigned char **reversed) {
   ORB_TRY(orb_surface_pieces(s));
   if (s->conflict >= 0 || (s->edges.same_way > 0 && !is_safe(repair))) {

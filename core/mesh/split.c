@@ -25,7 +25,7 @@
 #include "mesh/sort.h"
 #include "numeric/vec3.h"
 
-/* Faces at one edge up to which the flattest pairs are sought where they do not all pair up; that costs the cube. */
+/* If the faces at one edge do not all pair up, the flattest pairs are sought among this many at most, in cubic time. */
 enum { FEW = 8 };
 
 /* The half-edges of one crowded edge. */
@@ -181,7 +181,7 @@ static orb_status pair_all(orb_surface *s, int around) {
   return status;
 }
 
-/* Makes the facing of each piece consistent; pieces end at crowded edges. */
+/* Orients each piece consistently; pieces end at crowded edges. */
 static orb_status face_alike(orb_surface *s) {
   int64_t count = 0;
   ORB_TRY(orb_surface_pieces(s));

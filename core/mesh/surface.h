@@ -1,4 +1,4 @@
-/* A mesh and its twins while it is checked and repaired: facing, pieces, fans, boundary loops. */
+/* A mesh and its twins while it is checked and repaired: orientation, pieces, fans, boundary loops. */
 #ifndef ORB_MESH_SURFACE_H
 #define ORB_MESH_SURFACE_H
 
@@ -13,7 +13,7 @@ typedef struct orb_surface {
   int32_t *piece;          /* of each face; pieces are connected over edges of two faces */
   unsigned char *reversed; /* of each face: whether it faces against the first face of its piece */
   int32_t piece_count;
-  int32_t conflict; /* a half-edge across which no facing is consistent, −1: none */
+  int32_t conflict; /* a half-edge across which no orientation is consistent, −1: none */
 } orb_surface;
 
 ORB_MUST_CHECK orb_status orb_surface_open(orb_context *ctx, orb_mesh *mesh, orb_surface *surface);
@@ -32,14 +32,14 @@ typedef struct orb_fans {
   int64_t joins; /* unions of pieces at shared vertices: piece_count − joins bodies do not touch */
 } orb_fans;
 
-/* Counts fans, for a consistent facing without crowded edges, after orb_surface_pieces(). split: each fan of a vertex
- * after the first gets a vertex of its own. O(F). */
+/* Counts fans, of a consistent orientation without crowded edges, after orb_surface_pieces(). split: each fan of a
+ * vertex after the first gets a vertex of its own. O(F). */
 ORB_MUST_CHECK orb_status orb_surface_fans(orb_surface *surface, int split, orb_fans *out);
 
-/* The open half-edge after the open half-edge h along the boundary, for a consistent facing. */
+/* The open half-edge after the open half-edge h along the boundary, of a consistent orientation. */
 int32_t orb_surface_next_open(const orb_surface *surface, int32_t h);
 
-/* Counts the boundary loops, for a consistent facing. O(F). */
+/* Counts the boundary loops, of a consistent orientation. O(F). */
 ORB_MUST_CHECK orb_status orb_surface_loops(orb_surface *surface, int64_t *loops);
 
 #endif

@@ -49,7 +49,7 @@ static orb_status count_fans(orb_surface *s, orb_topology *out, int64_t *used) {
   return ORB_OK;
 }
 
-/* Counts boundary loops without a consistent facing: as components of the boundary. Loops that meet at a vertex of
+/* Counts boundary loops without a consistent orientation: as components of the boundary. Loops that meet at a vertex of
  * several fans count as one. */
 static orb_status count_loops(orb_surface *s, int64_t *loops) {
   const orb_mesh *mesh = s->mesh;

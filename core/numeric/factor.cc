@@ -1,4 +1,4 @@
-#define EIGEN_MPL2_ONLY  // of Eigen only what is under the MPL 2.0
+#define EIGEN_MPL2_ONLY  // only the parts of Eigen that are under the MPL 2.0
 
 #include "numeric/factor.h"
 

@@ -1,5 +1,5 @@
-/* A symmetric positive definite sparse matrix that is factorised again and again with other values on its diagonal, by
- * Eigen's templates: nothing is linked. */
+/* A symmetric positive definite sparse matrix that is factorised repeatedly, with different diagonals, by Eigen's
+ * templates: nothing is linked. */
 #ifndef ORB_NUMERIC_FACTOR_H
 #define ORB_NUMERIC_FACTOR_H
 
@@ -24,7 +24,7 @@ void orb_factor_destroy(orb_factor *factor);
 /* Factorises with this diagonal, which must make the sum of every row positive. O(n^1.5) for a surface. */
 ORB_MUST_CHECK orb_status orb_factor_compute(orb_factor *factor, const double *diagonal);
 
-/* Solves for three right sides at once: x and right are 3 an unknown. O(n log n) for a surface. */
+/* Solves for three right sides at once: x and right are 3 per unknown. O(n log n) for a surface. */
 void orb_factor_solve3(const orb_factor *factor, const double *right, double *x);
 
 #ifdef __cplusplus

@@ -6,9 +6,10 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
-/* Most Newton steps to an eigenvalue, from above; three or four suffice where it is far from the next one. And, of the
- * cubed eigenvalue, the least product of its distances from the others at which these steps suffice. */
+/* Most Newton steps to an eigenvalue, from above; three or four suffice where it is far from the next one. */
 enum { STEPS = 30 };
+/* Least product of an eigenvalue's distances from the others, as a share of the cubed eigenvalue: with less, the steps
+ * do not suffice. */
 static const double CLEAR = 1e-3;
 
 /* The determinant of the rows and columns of a 4×4 matrix but for one of each, with the sign of a cofactor. */

@@ -1,8 +1,9 @@
 /* Vectors of three doubles, as plain arrays.
  *
  * The folder depends on core/base only: vec3.h, frame (tangent planes), predicates (exact orientations), dense (linear
- * solver, singular values), factor (sparse linear solver), rotation (nearest rotation), clones.h (one function for
- * several vector widths), lanes.inc.h (short vectors, for loops that are compiled for several instruction sets). */
+ * solver, singular values), factor (sparse linear solver), rotation (nearest rotation), rotate_along.h (rotation from
+ * one direction to another), clones.h (one function for several vector widths), lanes.inc.h (short vectors, for loops
+ * that are compiled for several instruction sets). */
 #ifndef ORB_NUMERIC_VEC3_H
 #define ORB_NUMERIC_VEC3_H
 

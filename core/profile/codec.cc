@@ -13,7 +13,7 @@ extern "C" {
 
 namespace {
 
-/* meshoptimizer allocates by itself: about 46 bytes a vertex to order triangles. A block of that size, never touched,
+/* meshoptimizer allocates by itself: about 46 bytes per vertex to order triangles. A block of that size, never touched,
  * charges them to the budget. */
 enum { BYTES_A_VERTEX = 48 };
 

@@ -14,7 +14,7 @@ extern "C" {
 ORB_MUST_CHECK orb_status orb_codec_order(orb_context *ctx, uint32_t *indices, size_t index_count, size_t vertex_count,
                                           uint32_t *order);
 
-/* Applies the filter OCTAHEDRAL with this many bits. unit: 4 floats a vertex, the last unused. stored and shown: 4
+/* Applies the filter OCTAHEDRAL with this many bits. unit: 4 floats per vertex, the last unused. stored and shown: 4
  * integers a vertex, before and after the decoder. */
 void orb_codec_octahedra(const float *unit, int32_t count, int bits, int16_t *stored, int16_t *shown);
 

@@ -78,7 +78,7 @@ static orb_status add_boxes(orb_context *ctx, const orb_source *source, const cJ
   return status;
 }
 
-/* The nearest number with so many decimal digits: short in the JSON, which every asset carries. */
+/* The nearest number with this many decimal digits: short in the JSON, which every asset carries. */
 static double shortened(double value, int digits) {
   char text[40];
   snprintf(text, sizeof text, "%.*e", digits - 1, value);

@@ -16,7 +16,7 @@ typedef struct orb_grid {
 ORB_MUST_CHECK orb_status orb_grid_choose(orb_context *ctx, const orb_source *source, const cJSON *primitives,
                                           int32_t levels, orb_grid *out);
 
-/* Rounds the base of a primitive, 3 floats a vertex. */
+/* Rounds the base of a primitive, 3 floats per vertex. */
 ORB_MUST_CHECK orb_status orb_grid_base(orb_context *ctx, const orb_grid *grid, const float *positions, int32_t count,
                                         orb_stream *out, double *error);
 /* Rounds a target so that it is best at full weight: the delta is the difference of two rounded positions. Then the

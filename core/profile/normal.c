@@ -1,8 +1,8 @@
 /* Why floats for most targets: the delta of two unit vectors is up to 2 long, but glTF has only integers up to 1 for
  * it, and its base must have length 1. A target takes integers if no delta of it has a larger component, so if no
- * normal turns far. Compressed, floats of few digits are no larger than such integers. The filter EXPONENTIAL stores a
- * float as mantissa · 2^exponent in four bytes: a mantissa of eight bits, placed in its topmost byte, leaves two bytes
- * zero, which cost next to nothing.
+ * normal rotates far. Compressed, floats of few digits are no larger than such integers. The filter EXPONENTIAL stores
+ * a float as mantissa · 2^exponent in four bytes: a mantissa of eight bits, placed in its topmost byte, leaves two
+ * bytes zero, which cost next to nothing.
  *
  * The bound. Let a and b be a normal of the floats on the base and at full weight, e and f the errors of the decoded
  * ones. At weight w the normal is n(w) = (1 − w)·a + w·b and its error (1 − w)·e + w·f, so the sine of the angle
@@ -26,7 +26,7 @@ static const double MOST = 0.016929;
 static const double OCTAHEDRAL_SLACK = 1.7320508 / 32767;
 
 /* How the base is stored. The first for which every vertex keeps the bound is taken; the later ones serve normals that
- * turn by nearly 180°, where n(w) nearly vanishes. BYTES or OCTAHEDRAL_9 is the first, the smaller of the two without
+ * rotate by nearly 180°, where n(w) nearly vanishes. BYTES or OCTAHEDRAL_9 is the first, the smaller of the two without
  * and with compression. */
 typedef enum precision { BYTES = 0, OCTAHEDRAL_9, OCTAHEDRAL_13, DIGITS_24, EXACT, PRECISIONS } precision;
 
@@ -116,7 +116,7 @@ typedef struct encoder {
   int32_t count;
   int compressed;
   double slack;
-  float *shown; /* the decoded base, 3 a vertex */
+  float *shown; /* the decoded base, 3 per vertex */
 } encoder;
 
 static orb_status encode_octahedra(encoder *self, int bits, orb_stream *out) {
@@ -209,7 +209,7 @@ static orb_status encode_floats(encoder *self, int filtered, orb_stream *out) {
   return ORB_OK;
 }
 
-/* Stores the delta of a vertex with so many digits, aimed at `goal` from what the base shows. Returns the bound. */
+/* Stores the delta of a vertex with this many digits, aimed at `goal` from what the base shows. Returns the bound. */
 static double try_digits(const encoder *self, size_t i, const double a[3], const double b[3], const double goal[3],
                          int bits, int exponent, float shown[3], uint32_t stored[3]) {
   double e[3], f[3];

@@ -11,7 +11,8 @@
 #include "remesh/placed/rims.h"
 #include "remesh/registry.h"
 
-/* Of the tolerance, for the method where rims follow: edges that they cut may deviate a little more. */
+/* The share of the tolerance that a method gets before rims are added: edges that they cut may deviate a little more.
+ */
 static const double RIMS_SHARE = 0.9;
 
 void orb_remesh_defaults(orb_remesh_options *options) {

@@ -1,4 +1,4 @@
-/* What ranks maps in eigenfunctions. */
+/* The measures that rank maps in eigenfunctions. */
 #ifndef ORB_SPECTRAL_COST_H
 #define ORB_SPECTRAL_COST_H
 
@@ -12,7 +12,7 @@ typedef struct orb_zoom_cost {
 /* O(samples²). Any thread. */
 void orb_zoom_measure(const orb_zoom_pair *pair, const orb_zoom *map, orb_zoom_cost *out);
 
-/* How far apart two maps take the samples of the first shape, in the mean, along the second, whose area is 1. */
+/* The mean distance, along the second shape (of area 1), between the images of the first shape's samples. */
 double orb_zoom_difference(const orb_zoom_pair *pair, const orb_zoom *map, const orb_zoom *other);
 
 #endif

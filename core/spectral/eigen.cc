@@ -1,6 +1,7 @@
-// With D = diag(mass)^(-1/2), the eigenpairs of K x = λ M x are those of D K D y = λ y, x = D y. Its inverse at a shift
-// below 0, where the matrix is positive definite, has them in reverse order and well apart.
-#define EIGEN_MPL2_ONLY  // of Eigen only what is under the MPL 2.0
+// With D = diag(mass)^(-1/2), the eigenpairs of K x = λ M x are those of D K D y = λ y, x = D y. With a shift below 0
+// that matrix is positive definite, and its inverse has the same eigenvectors in reverse order, with eigenvalues that
+// lie well apart.
+#define EIGEN_MPL2_ONLY  // only the parts of Eigen that are under the MPL 2.0
 
 #include "spectral/eigen.h"
 
@@ -22,7 +23,7 @@ using Vector = Eigen::VectorXd;
 constexpr double tolerance = 1e-9;
 constexpr int restarts = 60;
 
-// What Spectra asks of an operator: y = (S - shift)^-1 x.
+// The operator that Spectra expects: y = (S - shift)^-1 x.
 class Inverse {
  public:
   using Scalar = double;
@@ -71,7 +72,7 @@ bool solve(int32_t n, const orb_entry *entries, int64_t count, const double *mas
   for (int32_t v = 0; v < n; v++) {  // not an eigenvector, and nearly orthogonal to none
     start[v] = std::sqrt(mass[v]) * (1 + 0.5 * std::sin(12.9898 * (v + 1)));
   }
-  // The shift is small beside the eigenvalues wanted: λ of number i is near 4 π i / area (Weyl 1911).
+  // The shift is small compared with the wanted eigenvalues: number i is near 4 π i / area (Weyl 1911).
   double area = 0;
   for (int32_t v = 0; v < n; v++) {
     area += mass[v];

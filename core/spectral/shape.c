@@ -11,15 +11,15 @@
 #include "spectral/distances.h"
 #include "spectral/eigen.h"
 
-enum { LEAST = 4 * ORB_SPECTRAL_FUNCTIONS }; /* vertices of a shape that is used */
+enum { LEAST = 4 * ORB_SPECTRAL_FUNCTIONS }; /* least vertices of a usable shape */
 
-static const double FLAT = 1e-9; /* of the mean area: a triangle with less counts as one with this much */
+static const double FLAT = 1e-9; /* of the mean area: a triangle with less counts as having this much */
 
 typedef struct work {
   orb_context *ctx;
   int32_t vertices, triangles;
   const int32_t *corner;
-  double *x, *mass, *normal; /* positions in units of √area; 3 a vertex: area normals */
+  double *x, *mass, *normal; /* positions in units of √area; 3 per vertex: area normals */
   orb_entry *entries;
 } work;
 
@@ -36,7 +36,7 @@ static double triangle_area2(const double *x, const int32_t *v, double normal[3]
   return orb_length(normal);
 }
 
-/* Positions in units in which the area is 1. 0: there is no area. */
+/* Scales positions so that the area is 1. Returns 0 if there is no area. */
 static int scale_positions(const orb_mesh *mesh, double *x) {
   double area = 0, normal[3];
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
@@ -89,7 +89,7 @@ static void fill_shares(const work *w, const int32_t *owner, int32_t count, doub
 }
 
 /* Samples by farthest points along the surface, from the point farthest from vertex 0, and the distances between them.
- * buffer: two doubles a vertex. */
+ * buffer: two doubles per vertex. */
 static void spread(const work *w, orb_distances *distances, double *buffer, int32_t *owner, orb_spectral_shape *out) {
   double *far = buffer, *one = buffer + w->vertices;
   orb_distances_from(distances, 0, far);

@@ -21,7 +21,7 @@ typedef struct orb_spectral_shape {
   double *function; /* function k at vertex v: [k · vertices + v] */
   int32_t sample[ORB_SPECTRAL_SAMPLES];
   float at[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_SAMPLES]; /* the functions at the samples */
-  /* Of the area, nearest to each sample among the first orb_spectral_samples(detail); the sum is 1. */
+  /* The share of the area nearest to each sample, among the first orb_spectral_samples(detail); the sum is 1. */
   double share[ORB_SPECTRAL_DETAILS][ORB_SPECTRAL_SAMPLES];
   /* normal · (gradient of i × gradient of k) at each sample, i < k, row by row: changes sign under a mirror image */
   float triple[ORB_SPECTRAL_TRIPLES][ORB_SPECTRAL_SAMPLES];

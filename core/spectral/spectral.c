@@ -1,6 +1,6 @@
 /* The starts: each of the first five eigenfunctions after the constant one goes to one of the same five of the other
  * shape, as it is or negated. 14 orders of them, each with 32 choices of signs, make 448 maps. They are refined in
- * stages; after each stage the best that differ go on. */
+ * stages. After each stage, the best of those that differ continue. */
 #include "spectral/spectral.h"
 
 #include <math.h>
@@ -27,8 +27,8 @@ static const struct {
   int levels;   /* that the maps are refined to */
   int32_t kept; /* maps, of those that differ */
 } stage[STAGES] = {{1, 80}, {4, 12}, {ORB_ZOOM_LEVELS, ORB_SPECTRAL_MAX}};
-static const double SAME = 0.05;  /* mean distance of the images, √area being 1: maps nearer than this are one */
-static const float APART = 0.03F; /* pairs are at least this far from each other, as the distances of samples say */
+static const double SAME = 0.05;       /* mean distance of the images, √area being 1: maps nearer than this are one */
+static const float APART = 0.03F;      /* pairs are at least this far apart, by the distances of samples */
 static const double ROUND_TRIP = 0.12; /* a pair whose image comes back farther away is not listed */
 
 typedef struct search {
@@ -58,7 +58,7 @@ static orb_status refine_all(search *s, int from, int to) {
   return orb_sliced_by(s->ctx, s->count, s->count, 1, refine, s);
 }
 
-/* Orders the maps by cost, best first, and keeps at most `most`, without those that are like a better one. */
+/* Orders the maps by cost, best first, and keeps at most `most`; drops those that resemble a better one. */
 static void keep_best(search *s, int32_t most) {
   for (int32_t i = 1; i < s->count; i++) {
     int32_t one = s->order[i], k = i;

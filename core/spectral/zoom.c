@@ -341,7 +341,7 @@ int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t s
   return orb_zoom_vertex_image(pair, map, pair->shape[back ? 1 : 0]->sample[sample], back);
 }
 
-/* Adds the squared differences of one function at so many vertices. */
+/* Adds the squared differences of one function at `count` vertices. */
 ORB_CLONES static void add_squares(const double *function, double value, size_t count, double *restrict sum) {
   for (size_t i = 0; i < count; i++) {
     const double d = value - function[i];

@@ -10,8 +10,8 @@
 
 typedef struct orb_net {
   int32_t vertex_count, vertex_capacity, triangle_count, triangle_capacity;
-  double *points;     /* 3 a vertex */
-  int32_t *triangles; /* 3 a triangle; first corner −1: dead */
+  double *points;     /* 3 per vertex */
+  int32_t *triangles; /* 3 per triangle; first corner −1: dead */
   int32_t *twin;      /* per half-edge */
   int32_t *out;       /* per vertex: a half-edge that leaves it; −1: dead */
 } orb_net;

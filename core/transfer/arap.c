@@ -270,7 +270,7 @@ static void place_whole(const orb_arap *path, double t, double *x, const double 
   }
 }
 
-/* Moves x from the blend to the solution at t. r: scratch, 3 a vertex. */
+/* Moves x from the blend to the solution at t. r: scratch, 3 per vertex. */
 static orb_status solve_at(orb_context *ctx, orb_arap *path, double t, double *r, double *x) {
   int64_t chunks = ((int64_t)path->vertex_count + GRAIN - 1) / GRAIN;
   side_job side = {path, t, x, r, orb_alloc(ctx, (size_t)chunks, sizeof *side.sums)};

@@ -6,7 +6,7 @@
 
 typedef struct orb_arap orb_arap;
 
-/* Prepares the path from a to b (3 a vertex, borrowed). O(V log V). */
+/* Prepares the path from a to b (3 per vertex, borrowed). O(V log V). */
 ORB_MUST_CHECK orb_status orb_arap_create(orb_context *ctx, const double *a, const double *b, int32_t vertex_count,
                                           const int32_t *triangles, int32_t triangle_count, orb_arap **out);
 void orb_arap_destroy(orb_context *ctx, orb_arap *path);

@@ -16,7 +16,7 @@
 typedef struct orb_draft_part {
   int32_t material; /* index into the materials of the first shape's mesh */
   int32_t vertex_count, triangle_count;
-  uint32_t *indices; /* 3 a triangle, into the part's vertices */
+  uint32_t *indices; /* 3 per triangle, into the part's vertices */
   int32_t *corners;  /* per vertex: a supermesh corner with its values */
 } orb_draft_part;
 

@@ -121,10 +121,10 @@ static void nearest_right_angles(double rotation[3][3], double out[3][3]) {
   }
 }
 
-/* The axes of files differ by right angles. What a rotation has beyond these, if it is too little to be a difference of
- * frames, comes from the shapes' postures: without it a shape stands as upright as in its file. Copies of one shape fit
- * far worse without it, and keep their rotation. If the correspondence may be wrong, so may all of the rotation be.
- * spread: Σ w b·b. */
+/* The axes of files differ by right angles. The rest of a rotation, if it is too small to be a difference of frames,
+ * comes from the shapes' postures; without it a shape stands as upright as in its file. Copies of one shape fit far
+ * worse without the rest, and keep it. If the correspondence may be wrong, the whole rotation may be wrong too. spread:
+ * Σ w b·b. */
 static void drop_posture(double rotation[3][3], double h[3][3], double scale, double spread, orb_fit fit) {
   static const double stay[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   double right[3][3], trace = 0;

@@ -11,7 +11,7 @@ typedef struct orb_motion {
   double moves; /* distance by which the mean of the fitted points moves */
 } orb_motion;
 
-/* The motion that brings `moved` nearest to `fixed` in the least-squares sense (both 3 a supermesh vertex): over the
+/* The motion that brings `moved` nearest to `fixed` in the least-squares sense (both 3 per supermesh vertex): over the
  * landmarks if there are at least three that lie on no line on either shape, else over all vertices, weighted by the
  * area around them on both shapes. fit NONE gives the identity, and so do both AUTOs unless the frames clearly differ
  * (see orb_fit). Source: Horn 1987; the scale is the ratio of spreads, so that fitting back is the inverse. */

@@ -11,8 +11,8 @@ typedef struct orb_edge_graph {
   double *diagonal;          /* per vertex: the sum of its weights */
 } orb_edge_graph;
 
-/* Weights an edge by the area of its two triangles over its squared length, on shapes a and b (3 a vertex) together: a
- * positive stand-in for cotangents. b counts at a's scale. On failure frees what it made. O(F). */
+/* Weights an edge by the area of its two triangles over its squared length, on shapes a and b (3 per vertex) together:
+ * a positive stand-in for cotangents. b counts at a's scale. On failure frees what it made. O(F). */
 ORB_MUST_CHECK orb_status orb_edge_graph_make(orb_context *ctx, const double *a, const double *b, int32_t vertex_count,
                                               const int32_t *triangles, int32_t triangle_count, orb_edge_graph *out);
 void orb_edge_graph_free(orb_context *ctx, orb_edge_graph *graph);

@@ -6,12 +6,12 @@
 #include "base/check.h"
 #include "base/memory.h"
 
-/* Around so many groups, but of at least LEAST_SIZE vertices: more groups make the correction better, and its
+/* About this many groups, each of at least LEAST_SIZE vertices: more groups make the correction better, but its
  * factorisation, which is cubic in their number, slower. */
 enum { GROUPS = 384, LEAST_SIZE = 16 };
 enum { LEAST_SHARE = 4 }; /* a group of less than this fraction of the usual size joins a neighbour */
-/* A constant solves the homogeneous system. A diagonal larger by a relative 1e-8, which a preconditioner does not feel,
- * makes the matrix regular; the absolute part serves a group without neighbours. */
+/* A constant solves the homogeneous system. A diagonal larger by a relative 1e-8 makes the matrix regular and does not
+ * matter to a preconditioner. The absolute part serves a group without neighbours. */
 static const double REGULAR = 1e-8, ALONE = 1e-12;
 /* Square of a pivot: keeps its inverse finite where rounding leaves nothing. */
 static const double LEAST_PIVOT = 1e-300;

@@ -18,7 +18,7 @@ ORB_MUST_CHECK orb_status orb_groups_create(orb_context *ctx, const int32_t *fir
                                             const double *weight, int32_t vertex_count, orb_groups *out);
 void orb_groups_free(orb_context *ctx, orb_groups *groups);
 
-/* Solves the groups' system for r (3 a vertex): the correction of group g is groups->sums[3g] … sums[3g + 2]. */
+/* Solves the groups' system for r (3 per vertex): the correction of group g is groups->sums[3g] … sums[3g + 2]. */
 void orb_groups_solve(orb_groups *groups, const double *r);
 
 #endif

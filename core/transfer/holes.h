@@ -7,7 +7,7 @@
 /* Whether fill_holes has filled a hole of the mesh. O(triangles). */
 int orb_has_holes(const orb_mesh *mesh);
 
-/* Gives slivers on a rim to the side of it on which they lie. The three corners of such a triangle are on one edge of
+/* Assigns slivers on a rim to the side on which they lie. The three corners of such a triangle are on one edge of
  * the rim, so rounding decides where its centre is; a lone one on the wrong side would leave a gap, or a flap. home:
  * for each triangle of the supermesh the triangle of the first shape that holds its centre; that of a group of slivers
  * becomes that of a neighbour on their side. O(triangles). */

@@ -30,7 +30,7 @@ static void free_keeper(orb_context *ctx, const orb_draft *draft, keeper *k) {
   orb_free(ctx, k->names);
 }
 
-/* The smooth normals of each frame, which tell how those of the document turn. */
+/* The smooth normals of each frame, which tell how those of the document rotate. */
 static orb_status make_normals(orb_context *ctx, const orb_draft *draft, keeper *k) {
   const orb_supermesh *mesh = draft->supermesh;
   k->normals = ORB_NEW0(ctx, double *, draft->frame_count);
@@ -79,7 +79,7 @@ static orb_status describe(orb_context *ctx, const orb_draft *draft, const orb_d
   return ORB_OK;
 }
 
-/* The document is that of the first shape. */
+/* An error is about the first shape: the document is that shape's. */
 static orb_status blame_first(orb_context *ctx, orb_status status) {
   if (status == ORB_E_BAD_OPTION || status == ORB_E_MALFORMED_MESH) {
     orb_context_error_edit(ctx)->shape = 0;

@@ -2,14 +2,14 @@
  *
  * Both surfaces are sampled (face centres, edge midpoints, vertices), and each sample's nearest point on the other is
  * found; the greatest distance of both ways is the sampled Hausdorff distance. The mean square is integrated by the
- * rule of seven points that is exact for cubics (1/20 a corner, 2/15 a midpoint, 9/20 the centre), with equal weight
- * for both surfaces. Supermesh vertices lie on the input by construction: their distance is 0. Normals are those of the
- * flat triangles, compared at the face centres and their nearest points.
+ * rule of seven points that is exact for cubics (1/20 per corner, 2/15 per midpoint, 9/20 the centre), with equal
+ * weight for both surfaces. Supermesh vertices lie on the input by construction: their distance is 0. Normals are those
+ * of the flat triangles, compared at the face centres and their nearest points.
  *
- * Where the distance has a proved bound, the samples serve the means and the percentile, which a few thousand settle:
- * at most ENOUGH of each kind are taken, one from each of as many runs of equal length, at a place in the run that its
- * number decides. A mean is then taken over the area that the samples of a kind stand for. The bound also limits each
- * search.
+ * Where the distance has a proved bound, the samples only serve the means and the percentile, for which a few thousand
+ * suffice. At most ENOUGH of each kind are taken: the items are divided into that many runs of equal length, and a hash
+ * of a run's number picks one item of it. A mean is then taken over the area that the samples of a kind stand for. The
+ * bound also limits each search.
  *
  * Many samples need no search. A supermesh triangle whose corners have their places in one triangle of the input lies
  * on it, and so do its samples, by interpolation of the corners' coordinates; the other way, a sample of an input
@@ -28,8 +28,8 @@
 #include "transfer/inside.h"
 
 enum { GRAIN = 256 }; /* samples a thread takes at a time; the sums, and so the result, depend on it */
-/* Samples of a kind on a surface with a proved bound. As many other samples change the rms and the mean angle by about
- * 2 %. */
+/* Samples of a kind on a surface with a proved bound. A different choice of as many changes the rms and the mean angle
+ * by about 2 %. */
 enum { ENOUGH = 4096 };
 enum { AREA_GRAIN = 4096 }; /* triangles; the mean area depends on it */
 enum { BINS = 18000 };      /* of the histogram of angles: a hundredth of a degree each */

@@ -29,7 +29,7 @@ static int32_t *slot_of(const namer *n, const char *text) {
   return &n->slots[slot];
 }
 
-/* Names tried on one text go up, so that a text is in the way of at most one other. */
+/* The numbers tried on one text only grow, so that a text is in the way of at most one other. */
 static void name_frame(namer *n, int32_t frame, const char *base) {
   orb_target_name *text = &n->texts[frame];
   (void)snprintf(*text, sizeof *text, "%s", base);

@@ -8,8 +8,8 @@
 typedef char orb_target_name[2 * ORB_NAME_MAX + 64];
 
 /* The names of the frames: of the shapes, of the in-betweens, of the targets of the options. A name is cut after
- * ORB_NAME_MAX − 1 bytes at most, and a later one that is taken gets a number; the first shape names the mesh, no
- * target, and takes none. texts and out: frame_count; out refers to texts. Expected O(N). */
+ * ORB_NAME_MAX − 1 bytes at most. If a name is taken, the later frame gets a number. The first shape names the mesh
+ * rather than a target, and takes no name. texts and out: frame_count; out refers to texts. Expected O(N). */
 ORB_MUST_CHECK orb_status orb_draft_names(orb_context *ctx, const orb_draft *draft, const char *const *names,
                                           orb_target_name *texts, const char **out);
 

@@ -22,7 +22,7 @@ typedef struct packer {
   orb_buffer binary;
   orb_gltf_accessor *accessors;
   int32_t accessor_count, accessor_capacity;
-  float *scratch; /* 4 a vertex of the largest part */
+  float *scratch; /* 4 per vertex of the largest part */
 } packer;
 
 static orb_status align_binary(packer *pack) {

@@ -116,7 +116,7 @@ static orb_status order_part(orb_context *ctx, orb_draft_part *part) {
   orb_status status = ORB_OK;
   uint32_t *remap = ORB_NEW(ctx, uint32_t, vertex_count);
   int32_t *corners = ORB_NEW(ctx, int32_t, vertex_count);
-  /* meshoptimizer allocates outside the context, about 60 bytes a triangle: reserve as much from its budget. */
+  /* meshoptimizer allocates outside the context, about 60 bytes per triangle: reserve as much from its budget. */
   void *held = orb_alloc(ctx, (size_t)part->triangle_count, 60);
   if (!remap || !corners || !held) {
     status = ORB_E_NO_MEMORY;

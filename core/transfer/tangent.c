@@ -192,7 +192,7 @@ static void finish_group(const tangent_job *job, int32_t frame, int32_t g, doubl
   double normal[3];
   int64_t corner = job->groups[g].corner;
   if (corner < 0) {
-    sum[0] = 1; /* nobody reads it */
+    sum[0] = 1; /* never read */
     return;
   }
   normal_at(job->draft, frame, corner, normal);
@@ -206,7 +206,7 @@ static void finish_group(const tangent_job *job, int32_t frame, int32_t g, doubl
   }
 }
 
-/* sums: room for 3 numbers a group. */
+/* sums: room for 3 numbers per group. */
 static orb_status make_frame(tangent_job *job, int32_t frame, double *sums) {
   const orb_supermesh *supermesh = job->draft->supermesh;
   orb_wedges *out = &job->draft->tangents[frame], *base = &job->draft->tangents[0];

@@ -5,7 +5,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
-#include "numeric/turn.h"
+#include "numeric/rotate_along.h"
 
 /* A copy, with the seams of the original. */
 static orb_status copy_wedges(orb_context *ctx, const orb_supermesh *supermesh, const orb_wedges *from,
@@ -24,28 +24,28 @@ static orb_status copy_wedges(orb_context *ctx, const orb_supermesh *supermesh, 
   return ORB_OK;
 }
 
-static void turn_normal(const double before[3], const double after[3], float normal[3]) {
-  double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, turned[3];
+static void rotate_normal(const double before[3], const double after[3], float normal[3]) {
+  double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, rotated[3];
   if (memcmp(before, after, 3 * sizeof *before) == 0 || !(orb_dot(before, before) > 0 && orb_dot(after, after) > 0)) {
     return;
   }
-  orb_turn(before, after, n, turned);
-  orb_normalize(turned);
+  orb_rotate_along(before, after, n, rotated);
+  orb_normalize(rotated);
   for (int c = 0; c < 3; c++) {
-    normal[c] = (float)turned[c];
+    normal[c] = (float)rotated[c];
   }
 }
 
 /* before: the smooth normals of the first frame. scratch: room for as many. */
-static orb_status turn_normals(orb_context *ctx, const orb_draft *draft, int32_t f, const double *before,
-                               double *scratch) {
+static orb_status rotate_normals(orb_context *ctx, const orb_draft *draft, int32_t f, const double *before,
+                                 double *scratch) {
   const orb_supermesh *mesh = draft->supermesh;
   orb_wedges *normals = &draft->normals[f];
   ORB_TRY(copy_wedges(ctx, mesh, &draft->normals[0], normals));
   ORB_TRY(
       orb_smooth_normals(ctx, draft->positions[f], mesh->vertex_count, mesh->triangles, mesh->triangle_count, scratch));
   for (int64_t v = 0; v < mesh->vertex_count; v++) {
-    turn_normal(before + 3 * v, scratch + 3 * v, normals->values + 3 * v);
+    rotate_normal(before + 3 * v, scratch + 3 * v, normals->values + 3 * v);
   }
   unsigned char *done = ORB_NEW0(ctx, unsigned char, normals->value_count);
   if (!done) {
@@ -54,7 +54,7 @@ static orb_status turn_normals(orb_context *ctx, const orb_draft *draft, int32_t
   for (int64_t h = 0; normals->of_corner && h < 3 * (int64_t)mesh->triangle_count; h++) {
     int64_t at = normals->of_corner[h], v = mesh->triangles[h];
     if (at >= mesh->vertex_count && !done[at]) { /* the first ones are those of the vertices */
-      turn_normal(before + 3 * v, scratch + 3 * v, normals->values + 3 * at);
+      rotate_normal(before + 3 * v, scratch + 3 * v, normals->values + 3 * at);
       done[at] = 1;
     }
   }
@@ -82,7 +82,7 @@ orb_status orb_draft_targets(orb_context *ctx, orb_draft *draft) {
       draft->positions[f][i] = draft->positions[0][i] + (double)options->targets[k].moves[i];
     }
     if (draft->normals) {
-      ORB_GO(status, turn_normals(ctx, draft, f, before, scratch), done);
+      ORB_GO(status, rotate_normals(ctx, draft, f, before, scratch), done);
     }
     if (draft->color_count > 1) {
       ORB_GO(status, copy_wedges(ctx, mesh, &draft->colors[0], &draft->colors[f]), done);

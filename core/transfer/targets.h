@@ -4,8 +4,8 @@
 
 #include "transfer/draft.h"
 
-/* Fills the frames after the in-betweens: positions, and where the draft has them, normals, which turn with the smooth
- * normal of the surface, and colours, which stay. */
+/* Fills the frames after the in-betweens: positions; normals, where the draft has them, which rotate with the smooth
+ * normal of the surface; and colours, which stay. */
 ORB_MUST_CHECK orb_status orb_draft_targets(orb_context *ctx, orb_draft *draft);
 
 #endif

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "mesh/normals.h"
-#include "numeric/turn.h"
+#include "numeric/rotate_along.h"
 
 enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
 
@@ -167,11 +167,11 @@ static orb_status make_positions(const maker *m, const orb_template *made, orb_d
 
 /* Rotates `normal` as the shortest rotation from `before` to `after` does; unit vectors. */
 static void rotate_along(const double before[3], const double after[3], const float normal[3], float out[3]) {
-  double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, turned[3];
-  orb_turn(before, after, n, turned);
-  orb_normalize(turned);
+  double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, rotated[3];
+  orb_rotate_along(before, after, n, rotated);
+  orb_normalize(rotated);
   for (int k = 0; k < 3; k++) {
-    out[k] = (float)turned[k];
+    out[k] = (float)rotated[k];
   }
 }
 
@@ -211,7 +211,7 @@ static orb_status make_normals(const maker *m, const orb_template *made, orb_dra
   return status;
 }
 
-/* One value of `width` floats a vertex made. */
+/* One value of `width` floats per vertex made. */
 static orb_status make_attribute(const maker *m, int32_t width, size_t offset, orb_wedges *out) {
   *out = (orb_wedges){.width = width, .value_count = m->count};
   out->values = ORB_NEW(m->ctx, float, (int64_t)width * m->count);

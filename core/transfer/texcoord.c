@@ -1,7 +1,7 @@
 /* Texture coordinates at the corners of a supermesh.
  *
  * A triangle that blends coordinates from both sides of a seam shows the whole texture between them, smeared. So each
- * supermesh triangle keeps to the side on which its centre lies: a walk leads straight on the sphere from the centre to
+ * supermesh triangle keeps to the side on which its centre lies: a walk goes straight on the sphere from the centre to
  * each corner, from input triangle to input triangle. Where it meets a seam (of coordinates or materials) it ends, and
  * the corner gets the coordinates of that point of the seam. The texture there is squeezed by less than a triangle. */
 #include "transfer/texcoord.h"
@@ -27,9 +27,9 @@ typedef struct texcoord_job {
   const orb_locator *locator;
   const int32_t *twin, *home;
   int32_t *home_out;
-  const float *texcoords;  /* 2 a corner of the shape */
+  const float *texcoords;  /* 2 per corner of the shape */
   const int32_t *material; /* of each triangle: where it changes is a seam, too; NULL: there are none */
-  float *corners;          /* 2 a corner of the supermesh */
+  float *corners;          /* 2 per corner of the supermesh */
 } texcoord_job;
 
 static void centre_of(const orb_supermesh *supermesh, int64_t t, double out[3]) {
@@ -88,7 +88,7 @@ static int is_seam(const texcoord_job *job, int32_t h) {
          !same_texcoord(job->texcoords, h, orb_next(g)) || !same_texcoord(job->texcoords, orb_next(h), g);
 }
 
-/* The edge over which the straight way from m to p leaves triangle t; −1 if p lies inside. */
+/* The edge over which the straight line from m to p leaves triangle t; −1 if p lies inside. */
 static int32_t exit_edge(const texcoord_job *job, int32_t t, const double m[3], const double p[3]) {
   int32_t out[3];
   int count = 0;
@@ -103,7 +103,7 @@ static int32_t exit_edge(const texcoord_job *job, int32_t t, const double m[3], 
   if (count == 1) {
     return out[0];
   }
-  /* p lies beyond two edges, so the corner that they share decides: it is left or right of the way. Seen from inside,
+  /* p lies beyond two edges, so the corner that they share decides: it is left or right of the line. Seen from inside,
    * edges run from right to left, so the edge that ends at the corner lies to its right. */
   int32_t ends = orb_next(out[0]) == out[1] ? out[0] : out[1];
   int32_t begins = ends == out[0] ? out[1] : out[0];
@@ -115,7 +115,7 @@ static double fraction_of(double a, double b) {
   return sum > 0 ? a / sum : 0.5;
 }
 
-/* The coordinates at the point where the way from m to p meets half-edge h. */
+/* The coordinates at the point where the line from m to p meets half-edge h. */
 static void at_edge(const texcoord_job *job, int32_t h, const double m[3], const double p[3], float out[2]) {
   const float *texcoords = job->texcoords;
   int32_t next = orb_next(h);

@@ -9,12 +9,13 @@ ORB_MUST_CHECK orb_status orb_home_triangles(orb_context *ctx, const orb_superme
                                              const orb_aligned_shape *shape, int32_t s, int32_t *out);
 
 /* Texture coordinates of the first shape; home: see orb_home_triangles(). No supermesh triangle straddles a seam: a
- * corner beyond one gets the coordinates of the point where the straight way from the triangle's centre meets the seam.
+ * corner beyond one gets the coordinates of the point where the straight line from the triangle's centre meets the
+ * seam.
  */
 ORB_MUST_CHECK orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh,
                                               const orb_aligned_shape *shape, const int32_t *home, orb_wedges *out);
 
-/* Likewise for a set of texture coordinates of shape s, 2 a corner of its mesh. Only materials of the first
+/* Likewise for a set of texture coordinates of shape s, 2 per corner of its mesh. Only materials of the first
  * shape make seams, as the asset has its primitives. */
 ORB_MUST_CHECK orb_status orb_wedge_charts(orb_context *ctx, const orb_supermesh *supermesh,
                                            const orb_aligned_shape *shape, int32_t s, const int32_t *home,

@@ -20,7 +20,8 @@
 enum { MAX_WIDTH = 4 };       /* red, green, blue, alpha */
 enum { GRAIN = 4096 };        /* vertices a thread takes at a time */
 enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
-/* Values of one vertex that differ by less are one: below what 8 bits a channel, or a normal on a screen, can show. */
+/* Values of one vertex that differ by less are one: below what 8 bits per channel, or a normal on a screen, can show.
+ */
 static const float SAME = 1e-6f;
 static const double NORMAL_SEAM = 0.01; /* half a degree: rounded normals of one smooth vertex differ by that */
 static const double COLOR_SEAM = 1e-3;  /* a quarter of a step of 8 bits */

@@ -26,7 +26,7 @@ ORB_MUST_CHECK orb_status orb_wedge_normals(orb_context *ctx, const orb_supermes
                                             const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
 ORB_MUST_CHECK orb_status orb_wedge_colors(orb_context *ctx, const orb_supermesh *supermesh,
                                            const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
-/* Likewise for colours that the mesh does not hold: 4 a corner of it. */
+/* Likewise for colours that the mesh does not hold: 4 per corner of it. */
 ORB_MUST_CHECK orb_status orb_wedge_colored(orb_context *ctx, const orb_supermesh *supermesh,
                                             const orb_aligned_shape *shape, int32_t s, const float *colors,
                                             orb_wedges *out);

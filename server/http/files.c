@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/mesh_codec.h"
 #include "http/disposition.h"
 #include "http/http.h"
 #include "metrics.h"
@@ -25,13 +26,14 @@ static void reply_sphere(request *r) {
 /* 0 without a response outside a task, if one is needed to verify, make or compress the object; releases the
  * description. */
 static int file_of(request *r, const cached *entry) {
-  char name[100], format[8] = "bin", disposition[DISPOSITION_SIZE];
+  char name[100], format[sizeof(api_format_name)] = "bin", disposition[DISPOSITION_SIZE];
   int done = 1;
   switch (r->route->id) {
     case ROUTE_MESH_FILE: {
       const char *at = strstr(entry->row.json, "\"format\":\"");
       if (at) {
-        sscanf(at, "\"format\":\"%7[a-z]", format);
+        at += strlen("\"format\":\"");
+        snprintf(format, sizeof format, "%.*s", (int)strcspn(at, "\""), at);
       }
       snprintf(name, sizeof name, "%.16s.%s", r->id, format);
       disposition_write(name, disposition);

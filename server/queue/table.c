@@ -14,7 +14,7 @@ int64_t unix_ms(void) {
   return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-/* A sphere has 52 bytes a vertex, 13 a triangle, and a head. Results of merges are of this order. */
+/* A sphere has 52 bytes per vertex, 13 per triangle, and a head. Results of merges are of this order. */
 enum { BYTES_OF_TRIANGLE = 39, BYTES_OF_HEAD = 512 };
 
 int64_t queue_bytes_of(int64_t cost) {

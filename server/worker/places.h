@@ -19,8 +19,8 @@
 
 #include "orbmorph/merge.h"
 
-/* Appends the file to out. meshes: the meshes given to the merge, one a shape; corners: from run_load_mesh(), one array
- * a shape. O(V · shapes). */
+/* Appends the file to out. meshes: the meshes given to the merge, one per shape; corners: from run_load_mesh(), one
+ * array a shape. O(V · shapes). */
 ORB_MUST_CHECK orb_status places_write(orb_context *ctx, const orb_mesh *meshes, int32_t *const *corners,
                                        const orb_merge_result *merged, orb_buffer *out);
 

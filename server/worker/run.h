@@ -71,11 +71,11 @@ typedef struct run_file {
 } run_file;
 
 /* Reads an uploaded mesh and repairs it in the same way as at upload. noted may be NULL. corners (may be NULL): the
- * vertices of each triangle of the file, 3 a triangle, numbered as in the file; memory of the context. raw (may be
+ * vertices of each triangle of the file, 3 per triangle, numbered as in the file; memory of the context. raw (may be
  * NULL) receives the file. */
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
                   int32_t noted_count, int32_t **corners, run_file *raw, api_problem *problem);
-/* The points of a stored sphere, 3 numbers a vertex; memory of the context. */
+/* The points of a stored sphere, 3 numbers per vertex; memory of the context. */
 int run_load_points(const run_env *env, orb_context *ctx, const char *embedding, const orb_mesh *mesh, double **points,
                     api_problem *problem);
 

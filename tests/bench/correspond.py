@@ -10,7 +10,7 @@ docs/bench-truth.md. Every pair belongs to the half that constants may be chosen
 only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
-shape swapped, the second one turned and its vertices and triangles shuffled, its triangles cut into four.
+shape swapped, the second one rotated and its vertices and triangles shuffled, its triangles cut into four.
 
 Every result is a file in the store, by version, pair and options: an interrupted run continues, and a finished one is
 printed again at once. --fresh measures again. The version is the hash of the program, so a new build has new results.

@@ -15,7 +15,7 @@ def write_obj(file, positions, triangles):
 
 
 def turned(surface, draw):
-    """The surface turned at random, its vertices and triangles shuffled. Also the new number of each triangle."""
+    """The surface rotated at random, its vertices and triangles shuffled. Also the new number of each triangle."""
     q = [draw.gauss(0, 1) for _ in range(4)]
     w, x, y, z = (c / math.hypot(*q) for c in q)
     rows = ((1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

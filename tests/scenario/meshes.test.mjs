@@ -74,6 +74,8 @@ test('every format is detected by its content', async (t) => {
     assert.equal(reply.json.format, format);
     assert.equal(reply.json.vertices, m.positions.length, format);
     assert.equal(reply.json.triangles, m.triangles.length, format);
+    const file = await d.get(`${reply.json.url}/file`);
+    assert.match(file.headers.get('content-disposition'), new RegExp(`\\.${format}\\b`), format);
   }
   const big = await d.upload(shapes.binaryPly(m, true));
   assert.equal(big.status, 201, big.bytes.toString());
@@ -241,7 +243,7 @@ test('a refusal of a bad mesh says what is wrong and where', async (t) => {
   }
   const twisted = await refused(strip, 422, 'not-orientable');
   assert.equal(twisted.edges.length, 1);
-  assert.match(twisted.detail, /one side only.*Cut the surface there, and close it\.$/);
+  assert.match(twisted.detail, /only one side.*Cut the surface there, and close it\.$/);
   await refused(obj(m).replace('v 1 0 0', 'v nan 0 0'), 422, 'not-finite');
   const grown = (scale, shift = 0) => ({ ...m, positions: m.positions.map((p) => p.map((x) => x * scale + shift)) });
   for (const scale of [1.1e30, 1e100, 1e150, 1e200, 1e308]) {

@@ -57,5 +57,5 @@ test('a soft landmark gives way where the map is better for it', async (t) => {
   for (const weight of [0, 1.5, 'much'])
     assertProblem(await d.post('/v1/supermeshes', request(weight)), 422, 'bad-option');
   const rotated = await d.make('/v1/supermeshes', request(0.5, { align: { method: 'rotate' } }));
-  assert.match(rotated.problem.detail, /weight below 1, which the method pin alone understands/);
+  assert.match(rotated.problem.detail, /weight below 1, which only the method pin accepts/);
 });

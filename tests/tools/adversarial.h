@@ -24,8 +24,8 @@ typedef enum adversarial_kind {
 
 typedef struct adversarial_mesh {
   int32_t vertex_count, triangle_count;
-  double *positions;  /* 3 a vertex */
-  int32_t *triangles; /* 3 a triangle */
+  double *positions;  /* 3 per vertex */
+  int32_t *triangles; /* 3 per triangle */
 } adversarial_mesh;
 
 const char *adversarial_name(adversarial_kind kind);

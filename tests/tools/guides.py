@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Checks that guides name files and folders that exist.
+"""Checks that guides name files and folders that exist, and that links of documents lead somewhere.
 
     tests/tools/guides.py
 
 A guide is a README.md or the comment at the head of a source file in core, api, server or client/cli. A name in a guide
 is relative to its folder, to a folder above, or to a folder below. In a README.md a word in backquotes, such as `walk`,
 names a folder or a file without its extension. The picture in CONTRIBUTING.md must have the folders of core, each once,
-in an order that layers.py allows. Exit status 1: a name without a file; each is printed. Standard library only; needs git.
+in an order that layers.py allows. A link in a Markdown file must lead to a file, and its anchor to a heading there. Exit
+status 1: a name without a file, or a link that leads nowhere; each is printed. Standard library only; needs git.
 """
+import os
 import pathlib
 import re
 import subprocess
@@ -20,6 +22,8 @@ NAME = re.compile(r"(?<![\w<./*-])[\w./-]*\w\.(?:inc\.h|c|h|cc|hh|md|py|sh|mjs|j
 FOLDER = re.compile(r"(?<![\w./<-])(?:[a-z_]+/)+(?![\w.*=<])")
 WORD = re.compile(r"`([a-z][a-z0-9_]*)`")
 PROGRAMS = {"orbmorph", "orbmorphd"}
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.MULTILINE | re.DOTALL)
 
 
 def tracked():
@@ -78,10 +82,33 @@ def picture(files):
         yield f"CONTRIBUTING.md: the order of layers.py is {' '.join(order)}"
 
 
+def anchors(text):
+    """The anchors of headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def broken(files):
+    """Links of Markdown files to files and headings that do not exist."""
+    texts = {file: (layers.ROOT / file).read_text(encoding="utf-8") for file in files if file.suffix == ".md"}
+    there = {folder for file in files for folder in file.parents} | set(files)
+    for file, text in texts.items():
+        for link in LINK.findall(CODE.sub("", text)):
+            name, _, anchor = link.partition("#")
+            if ":" in name:
+                continue  # another site
+            folder = "docs" if file.parts[:2] == ("tests", "bench") else file.parent  # heads of generated documents
+            target = pathlib.PurePath(os.path.normpath(folder / pathlib.PurePath(name))) if name else file
+            if target not in there:
+                yield f"{file}: the link {link} leads to no file"
+            elif anchor and anchor not in anchors(texts.get(target, "")):
+                yield f"{file}: the link {link} leads to no heading"
+
+
 def main():
     files = tracked()
-    found = [*missing(files), *picture(files)]
-    print("\n".join([*found, f"{len(found)} names without a file"]))
+    found = [*missing(files), *picture(files), *broken(files)]
+    print("\n".join([*found, f"{len(found)} names and links that lead nowhere"]))
     return 1 if found else 0
 
 

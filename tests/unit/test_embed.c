@@ -269,7 +269,7 @@ static void test_budget(void **unused) {
     orb_embedding e;
     orb_status status = orb_embed(ctx, &mesh, NULL, &e);
     if (i == 0) {
-      assert_int_equal(status, ORB_OK); /* 250 bytes a triangle are enough */
+      assert_int_equal(status, ORB_OK); /* 250 bytes per triangle are enough */
       orb_embedding_free(ctx, &e);
     } else {
       assert_int_equal(status, ORB_E_NO_MEMORY);

@@ -56,7 +56,7 @@ static unsigned char clear_of(uint32_t i) {
   return (unsigned char)(i < 3 ? 60 * i : 255);
 }
 
-/* What the specification says that a pixel looks like, in 8 bits a channel. */
+/* What the specification says that a pixel looks like, in 8 bits per channel. */
 static void pixel_of(const kind *k, int x, int y, unsigned char out[4]) {
   const double most = (1 << k->depth) - 1;
   int is_gray = k->channels < 3;

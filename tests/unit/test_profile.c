@@ -309,7 +309,7 @@ static int normal_type(orb_context *ctx, synthetic_map map, int of_target, doubl
   return type;
 }
 
-/* Of 60 bytes a vertex and its two triangles 36 are left, or 44 where a normal turns too far for integers. */
+/* Of 60 bytes per vertex and its two triangles 36 are left, or 44 where a normal turns too far for integers. */
 static void quantized_normals_are_bytes(void **state) {
   double share;
   assert_int_equal(normal_type(*state, ellipsoid, 0, &share), 5120);

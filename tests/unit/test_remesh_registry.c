@@ -93,21 +93,31 @@ static void methods_heed_what_the_registry_says(void **state) {
   }
 }
 
-/* Compares every enumeration that starts like the list with the list. Returns their number. */
-static int check_enumerations(const cJSON *node) {
+static int is_the_list(const cJSON *array) {
+  int same = cJSON_GetArraySize(array) == ORB_REMESH_METHOD_COUNT;
+  for (int i = 0; same && i < ORB_REMESH_METHOD_COUNT; i++) {
+    same = strcmp(cJSON_GetArrayItem(array, i)->valuestring, orb_remesh_method_name((orb_remesh_method)i)) == 0;
+  }
+  return same;
+}
+
+/* Compares every enumeration that starts like the list with the list. Returns their number; *others: those that differ,
+ * each is printed. */
+static int check_enumerations(const cJSON *node, int *others) {
   int found = 0;
   if (node->string && strcmp(node->string, "enum") == 0 && cJSON_IsArray(node)) {
     const cJSON *first = cJSON_GetArrayItem(node, 0);
     if (cJSON_IsString(first) && strcmp(first->valuestring, orb_remesh_method_name(0)) == 0) {
-      assert_int_equal(cJSON_GetArraySize(node), ORB_REMESH_METHOD_COUNT);
-      for (int i = 0; i < ORB_REMESH_METHOD_COUNT; i++) {
-        assert_string_equal(cJSON_GetArrayItem(node, i)->valuestring, orb_remesh_method_name((orb_remesh_method)i));
-      }
       found++;
+      if (!is_the_list(node)) {
+        print_error("api/openapi.json: an enumeration of %d methods is not the list of %d\n", cJSON_GetArraySize(node),
+                    (int)ORB_REMESH_METHOD_COUNT);
+        ++*others;
+      }
     }
   }
   for (const cJSON *child = node->child; child; child = child->next) {
-    found += check_enumerations(child);
+    found += check_enumerations(child, others);
   }
   return found;
 }
@@ -116,8 +126,10 @@ static void the_api_document_names_the_same_methods(void **state) {
   (void)state;
   char *text = read_source("api/openapi.json");
   cJSON *document = cJSON_Parse(text);
+  int others = 0;
   assert_non_null(document);
-  assert_true(check_enumerations(document) > 0);
+  assert_true(check_enumerations(document, &others) > 0);
+  assert_int_equal(others, 0);
   cJSON_Delete(document);
   free(text);
 }
@@ -131,6 +143,7 @@ static void the_clients_name_every_method(void **state) {
                {"client/web/src/url.ts", "'"},
                {"client/web/src/ui/shapes.tsx", "\""},
                {"deploy/man/orbmorph.1", " "}};
+  int missing = 0;
   for (size_t f = 0; f < sizeof files / sizeof *files; f++) {
     char *text = read_source(files[f].path);
     for (int i = 0; i < ORB_REMESH_METHOD_COUNT; i++) {
@@ -138,11 +151,13 @@ static void the_clients_name_every_method(void **state) {
       snprintf(quoted, sizeof quoted, "%s%s%s", files[f].quote, orb_remesh_method_name((orb_remesh_method)i),
                files[f].quote);
       if (!strstr(text, quoted)) {
-        fail_msg("%s does not name the remesh method %s", files[f].path, quoted);
+        print_error("%s does not name the remesh method %s\n", files[f].path, quoted);
+        missing++;
       }
     }
     free(text);
   }
+  assert_int_equal(missing, 0);
 }
 
 /* The command line knows only HTTP: its words stand in its own table, in the order of the list. */

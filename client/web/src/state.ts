@@ -24,7 +24,7 @@ export interface Shape {
   facts?: { vertices: number; triangles: number; format: string };
   /** what its file has besides the surface, as far as the page can read it */
   extras?: Extra[];
-  /** what of that the morph takes */
+  /** which of these the morph takes */
   taken?: Extra[];
   /** The repairs that it was uploaded with. */
   repair?: string;
@@ -111,7 +111,7 @@ export interface Matches {
   told?: Told; // once it is known
 }
 
-/** What the alternatives of a match do otherwise. */
+/** How the alternatives of a match differ from it. */
 export interface Told {
   landmarks: string[]; // the names of the found landmarks, to which the swaps refer
   others: (Other & { cost: number; shape: number })[]; // in the order of the alternatives

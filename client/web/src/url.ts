@@ -154,9 +154,9 @@ const dead = (what: string) =>
     },
   });
 
-/** The browser takes some 30 ms for a new URL: it draws its address and loads the icon. So it is written at rest. */
+/** A new URL costs the browser some 30 ms: it draws its address and loads the icon. So the URL is written at rest. */
 const REST = 600; // ms: longer than a frame of a large shape
-const LONGEST = 2400; // ms, after which it is written all the same
+const LONGEST = 2400; // ms, after which it is written anyway
 let timer = 0;
 let since = 0;
 function save() {
@@ -183,7 +183,7 @@ function write(next: string) {
   history.replaceState(null, '', next || location.pathname + location.search);
 }
 
-/** What the page shows, if it goes away before that is in its URL: a page that reloads has the URL of before. */
+/** Holds what the page shows if it goes away before that is in its URL: a page that reloads has the old URL. */
 const LATE = 'orbmorph.late';
 
 function keepLate() {

@@ -129,7 +129,7 @@ const morph = (out, files, landmarks, triangles) =>
   );
 try {
   const samples = join(root, 'tests/samples');
-  // Without the elbows: of three shapes they make a foreleg turn halfway around itself on its way.
+  // Without the elbows: with three shapes, they twist a foreleg by half a turn.
   const { landmarks } = JSON.parse(readFileSync(join(samples, 'dog-giraffe-elephant.json')));
   const animals = join(work, 'animals.json');
   writeFileSync(animals, JSON.stringify(landmarks.filter(({ name }) => !/elbow/.test(name))));

@@ -106,7 +106,7 @@ double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *copy, 
     const size_t v = 3 * (size_t)places->vertex[s][i];
     double beside = sqrt(orb_distance2(copy->mesh.positions + v, places->at[s] + 3 * (size_t)i));
     double away = sqrt(orb_distance2(pose + v, places->at[1 - s] + 3 * (size_t)i));
-    sum += fmax(0, away - beside); /* a landmark lies beside the vertex that stands for it */
+    sum += fmax(0, away - beside); /* a landmark lies this far beside the vertex that stands for it */
   }
   return places->few > 0 ? sum / places->few : 0;
 }

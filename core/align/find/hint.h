@@ -1,5 +1,5 @@
-/* What landmarks say of a match before it is made: whether the two shapes are one in two poses, and whether a rough map
- * takes the landmarks to their partners. */
+/* What landmarks say of a match before it is made: whether the two shapes are one body in two poses, and whether a
+ * rough map takes the landmarks to their partners. */
 #ifndef ORB_ALIGN_FIND_HINT_H
 #define ORB_ALIGN_FIND_HINT_H
 
@@ -10,8 +10,8 @@
 typedef struct orb_match_hint {
   int32_t count, few; /* the first `few` of them exclude maps; all of them draw the best map to their partners */
   const int32_t *first, *second;
-  double stretch; /* orb_hint_stretch() above which the shapes are not one in two poses */
-  double sure;    /* the same up to which they are; between the two, what the best match bends decides */
+  double stretch; /* orb_hint_stretch() above which the shapes are not one body in two poses */
+  double sure;    /* orb_hint_stretch() up to which they are; between the two, the bend of the best match decides */
 } orb_match_hint;
 
 /* The hint on scaled coarse copies of the shapes. */
@@ -21,8 +21,8 @@ typedef struct orb_hint_places {
   double *at[2];      /* the landmark, in the copy's space */
 } orb_hint_places;
 
-/* Finds the places. at[2]: where the landmarks lie in the copies' spaces, 3 each; `out` takes both over, also if it
- * fails. few: as of the hint. Free `out` in any case. O(count · n). */
+/* Finds the places. at[2]: where the landmarks lie in the copies' spaces, 3 each; `out` takes ownership of both, also
+ * on failure. few: as in orb_match_hint. Free `out` in any case. O(count · n). */
 ORB_MUST_CHECK orb_status orb_hint_places_create(orb_context *ctx, int32_t count, int32_t few, double *at[2],
                                                  const orb_coarse_copy copy[2], orb_hint_places *out);
 void orb_hint_places_free(orb_context *ctx, orb_hint_places *places);
@@ -33,12 +33,12 @@ ORB_MUST_CHECK orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hi
                                                   orb_elastic_anchor **out);
 
 /* The mean of |ln(d/d')| over pairs of landmarks that are far apart, where d and d' are their distances along the two
- * surfaces, of equal areas: 0 for one shape in two poses. INFINITY if no two are far apart. O(n log n). */
+ * surfaces, of equal areas: 0 for one body in two poses. INFINITY if no two are far apart. O(n log n). */
 ORB_MUST_CHECK orb_status orb_hint_stretch(orb_context *ctx, const orb_hint_places *places,
                                            const orb_coarse_copy copy[2], double *stretch);
 
-/* How far the landmarks of copy s end from their partners, in the mean, where `pose` has its vertices in the space of
- * the other one (3 each). */
+/* The mean distance at which the landmarks of copy s end from their partners, if `pose` has the copy's vertices in the
+ * space of the other one (3 each). */
 double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *copy, int s, const double *pose);
 
 #endif

@@ -1,10 +1,11 @@
-/* Which points of two shapes correspond, by rough maps, ranked by how much they bend the shapes. Landmarks, where there
- * are any, exclude maps, and draw the best of the others to their partners.
+/* Which points of two shapes correspond, by rough maps, ranked by how much they bend the shapes. If there are
+ * landmarks, they exclude maps, and draw the best of the others to their partners.
  *
- * Comes in: two meshes. Goes out: where each vertex of the second lies on the first. Read in this order:
+ * In: two meshes. Out: where each vertex of the second lies on the first. Read in this order:
  *
  *   hint.h    what landmarks say of a match
- *   match.h   the best of the rough maps
+ *   trials.h  rough maps, registered and ranked
+ *   match.h   the best of them, its pairs and its targets
  *   found.h   the landmarks that an alignment found, and their confidence
  *   params.h  all thresholds
  *
@@ -38,30 +39,30 @@ typedef struct orb_match_other {
   orb_match_pairs pairs;
 } orb_match_other;
 
-typedef struct orb_match_search orb_match_search; /* match.c */
+typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_match {
   int is_found; /* 0: a shape has too few vertices, or no map was found; nothing else is filled then */
   double bend;  /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
-  double cost;  /* its bend, times 1 to 1 + ORB_FIND_TURN_COST for its rotation in space */
+  double cost;  /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space */
   double clear; /* 0 to 1: how far the next best map that differs is behind */
-  double lead; /* how much the nearest other map bends the shapes, divided by the same for the best one; both count half
-                  of the rotation in space. About 1 where a shape looks alike from several sides */
+  double lead;  /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
+                   half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  double *target;           /* where each vertex of the second shape lies on the first one, in its space: 3 a vertex */
-  orb_match_search *search; /* the candidates, for the two functions below */
+  double *target;     /* where each vertex of the second shape lies on the first one, in its space: 3 per vertex */
+  orb_trials *trials; /* the candidates, for the two functions below */
 } orb_match;
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
- * poses, and only maps count that take the first few near their partners; the targets then take all of them there. Free
- * `out` in any case. About 1 s of one thread, whatever the size; trials run on all threads, and the result has the same
- * bytes for any number of them. */
+ * poses. Only maps that take the first few landmarks near their partners count; the targets then take all landmarks
+ * there. Free `out` in any case. About 1 s of one thread, whatever the size. Trials run on all threads, and the result
+ * has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
-/* The target of other[k], which the caller frees, also on failure. The meshes of the match must still be there. About
- * 0.4 s of one thread. */
+/* Computes the target of other[k], which the caller frees, also on failure. The meshes of the match must still exist.
+ * About 0.4 s of one thread. */
 ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);
 /* Makes other[k] the best map; the former best map becomes the first of the others. target: that of other[k]; the match
  * takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that decided.

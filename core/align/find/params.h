@@ -14,8 +14,8 @@
 /* Matches (match.c). */
 
 enum {
-  ORB_FIND_COARSE = 1000, /* vertices of the copies that are registered, here and in suspects.c: each trial costs a time
-                             that grows with the square of this */
+  ORB_FIND_COARSE = 1000, /* vertices of the copies that are registered, here and in suspects.c: the time of each trial
+                             grows with the square of this */
   ORB_FIND_FINE = 8000,   /* vertices of the finer copies on which the best match is settled: with 4000, fingers are too
                              coarse for starts to follow, and maps of 20 pairs have 2 % more energy */
   ORB_FIND_SPECTRAL = 6, /* spectral maps that are tried: of 40 pairs of posed people, the right one was among the first
@@ -23,69 +23,70 @@ enum {
   ORB_FIND_ROTATIONS = 3 /* rotations of the spheres that are tried: the best of the rotation search */
 };
 
-/* A rotation by π in space multiplies how much a map bends by 1 + this, because files usually have shapes upright and
- * facing one way: a man matched back to front bends hardly more than matched rightly. With 1 instead, bodies whose
- * files face away from each other are matched back to front. */
-static const double ORB_FIND_TURN_COST = 0.5;
-/* Of the pairs of posed people, no spectral map that costs so much more than the first was the right one. */
+/* A rotation by π in space multiplies the bend of a map by 1 + this, because files usually have shapes upright and
+ * facing one way: a man matched back to front bends hardly more than one matched correctly. With 1 instead, bodies
+ * whose files face away from each other are matched back to front. */
+static const double ORB_FIND_ROTATION_COST = 0.5;
+/* A spectral map that costs this much more than the first is not tried: among the pairs of posed people, none was
+ * right. */
 static const double ORB_FIND_SPECTRAL_BEHIND = 0.8;
-/* A map that bends this many times as much as the best one in one direction does not win by the other direction: these
- * differ by a factor of 1.5 where the map is right. */
+/* A map that bends this many times as much as the best one in one direction does not win by the other direction: the
+ * two directions of a right map differ by a factor of 1.5. */
 static const double ORB_FIND_BEHIND = 2;
-/* The energy of the map of the best match above which the next best match is tried as well, unless that bends so many
- * times as much. Three in four right maps of two people have at most 1.2. The factor is from rougher registrations, in
- * which the right match of dan-neutral and dan-twist bent 3.2 times as much as the wrong one. */
+/* If the map of the best match has more energy than this, the next best match is tried as well, unless it bends
+ * OTHER_BEHIND times as much. Three in four right maps of two people have at most 1.2. The factor is from rougher
+ * registrations, in which the right match of dan-neutral and dan-twist bent 3.2 times as much as the wrong one. */
 static const double ORB_FIND_OTHER_ABOVE = 1.2, ORB_FIND_OTHER_BEHIND = 4;
-/* The share that the map of the next best match may have of what the best one's bulk is above 1, where it is taken in
- * that one's place. In those rougher registrations the bulk of the right map of that pair had 0.6 to 0.91, by the last
- * bits of the sums; other pairs of people, whose best match was right, had 1.02 to 1.6. */
+/* The next best match replaces the best one if the bulk of its map exceeds 1 by less than this share of what the best
+ * map's bulk does. In those rougher registrations, the right map of that pair had a share of 0.6 to 0.91, depending on
+ * the last bits of sums. Other pairs of people, whose best match was right, had 1.02 to 1.6. */
 static const double ORB_FIND_OTHER_GAIN = 0.95;
-/* What a match bends the shapes, above which walks are tried before the start from its targets. People in poses bend by
- * 0.02 to 0.13, and the start leads to the better map; other shapes bend by 0.16 to 0.5, and a walk mostly does. With
- * 0.15, the right match of emmy-neutral and dan-twist, the second of that pair, is walked and lost. */
+/* If a match bends the shapes more than this, walks are tried before the start from its targets. People in poses bend
+ * by 0.02 to 0.13, and the start leads to the better map. Other shapes bend by 0.16 to 0.5, and mostly a walk does.
+ * With 0.15, the right match of emmy-neutral and dan-twist, the second of that pair, is walked and lost. */
 static const double ORB_FIND_WALKS_FIRST = 0.2;
-/* The mean energy of the maps of several matches above which their pairs are pinned. From when two shapes were pinned
- * as well: three such pairs came to 1.9, 2.2 and 4.4 in 10 s. */
+/* If the mean energy of the maps of several matches is above this, their pairs are pinned. Chosen when two shapes were
+ * pinned as well: three such pairs came to 1.9, 2.2 and 4.4 in 10 s. */
 static const double ORB_FIND_PINS_ABOVE = 2.5;
-/* The energy of rotated spheres up to which the shapes are alike, as balls with small features are, and keep their
- * given spheres. Rotated spheres of people in poses have 4 and more. */
+/* Up to this energy of rotated spheres the shapes are alike, such as balls with small features, and keep their given
+ * spheres. The rotated spheres of people in poses have 4 and more. */
 static const double ORB_FIND_ALIKE = 2;
-/* What `clear` is where all other maps are the same. */
+/* The value of `clear` if all other maps are the same. */
 static const double ORB_FIND_CLEAR_ALONE = 0.5;
 
-/* What `lead` is where all other maps are the same, and its most. */
+/* The value of `lead` if all other maps are the same, and its largest value. */
 static const double ORB_FIND_LEAD_ALONE = 2, ORB_FIND_LEAD_MOST = 100;
 
-/* Of the diagonal: mean distance of the images of vertices under two maps. Nearer ones count as one correspondence and
- * do not lower each other's confidence. */
+/* The mean distance of the images of vertices under two maps, as a share of the diagonal. Nearer maps count as one
+ * correspondence and do not lower each other's confidence. */
 static const double ORB_FIND_DIFFERENT = 0.15;
 
 /* Matches that must agree with landmarks (hint.c). */
 
 enum {
   ORB_FIND_HINT_LEAST = 4,  /* landmarks; fewer do not tell a pose from other proportions */
-  ORB_FIND_HINT_FEW = 8,    /* landmarks that a match must agree with: as many
-                               as a body has tips. With 4 or 24 at first, a third of the pairs folded */
+  ORB_FIND_HINT_FEW = 8,    /* landmarks that a match must agree with: as many as a body has tips. With 4 or 24 at
+                               first, a third of the pairs folded */
   ORB_FIND_HINT_SOURCES = 6 /* landmarks from which distances are measured; each takes 1 ms */
 };
-/* Distances shorter than this are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.
+/* Shorter distances are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.
  */
 static const double ORB_FIND_HINT_FAR = 0.5;
-/* Shapes whose landmarks' distances differ by more than the second, as a mean logarithm, are not one shape in two
- * poses: people have 0.03 to 0.24, different animals 0.12 to 0.57. Above the first, where a walk came to a good or a
- * fair map, the match may bend the shapes by so much: there it bends people by up to 0.13, different animals by 0.16
- * and more. */
+/* If the distances between landmarks differ by more than STRETCH_MOST, as a mean logarithm, the shapes are not one body
+ * in two poses: people have 0.03 to 0.24, different animals 0.12 to 0.57. If they differ by more than STRETCH, and a
+ * walk came to a good or fair map, the match may bend the shapes by BEND at most: there it bends people by up to 0.13,
+ * and different animals by 0.16 and more. */
 static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0.25, ORB_FIND_HINT_BEND = 0.15;
-/* A rough map that takes landmarks farther from their partners than this, in the mean, is another one. In radii of a
- * ball of the shape's area. */
+/* If a rough map takes the landmarks farther from their partners than this mean distance, it is another map. In radii
+ * of a ball of the shape's area. */
 static const double ORB_FIND_HINT_OFF = 0.5;
 
-/* Landmarks that bend a pose more than this many times what it bends without them have twisted it: in 77 comparisons of
- * people, with 8 and 24 landmarks, they bent it 0.7 to 1.4 times as much, or 6.6 times and more. */
+/* If landmarks bend a pose more than this many times as much as it bends without them, they have twisted it. In 77
+ * comparisons of people, with 8 and 24 landmarks, they bent it 0.7 to 1.4 times as much, or 6.6 times and more. */
 static const double ORB_FIND_DRAWN_BEND = 2;
 
-/* The energy of the map that such a match leads to, above which all other starts are tried as well: shrec397 to
- * shrec393 had 3.1 from noisy targets, and 1.4 from other starts; right maps of people have at most 1.5. */
+/* If the map that such a match leads to has more energy than this, all other starts are tried as well: shrec397 to
+ * shrec393 had 3.1 from noisy targets, and 1.4 from other starts. Right maps of people have at most 1.5. */
 static const double ORB_FIND_POSED_POOR = 1.8;
 
 /* Found landmarks (found.c). */
@@ -93,8 +94,8 @@ static const double ORB_FIND_POSED_POOR = 1.8;
 /* Triangles of the first shape whose distortion gives the confidence of a landmark. Fewer make it depend on single
  * triangles, more make it less local. */
 enum { ORB_FIND_PATCH = 64 };
-/* orb_match.clear (0 to 1) from which no confidence falls. Below, all fall in proportion: a second candidate is
- * then nearly as good. */
+/* No confidence falls while orb_match.clear (0 to 1) is at least this. Below it all fall in proportion: a second
+ * candidate is then nearly as good. */
 static const double ORB_FIND_CLEAR = 0.5;
 
 /* Confidence in a match (match.c): 1 / (1 + exp(−odds)), where the odds, a natural logarithm, are these weights of 1,
@@ -102,11 +103,11 @@ static const double ORB_FIND_CLEAR = 0.5;
  * lower them. Fitted by logistic regression with a weak ridge to 21 pairs of people and animals of the half `choose`, 3
  * of them wrong, and rounded. docs/bench-confidence.md has the pairs, and the half `report`. */
 static const double ORB_FIND_SURE = 3, ORB_FIND_SURE_CLEAR = 3, ORB_FIND_SURE_BEND = 7, ORB_FIND_SURE_ENERGY = 10;
-/* Two maps share the confidence as 1 to exp(−(lead − 1) / this): half of it is left where they bend the shapes alike.
- * About as much as the bend of one map varies with the triangles of its shapes: a pear on a box of 11 to 26 edges a
+/* Two maps share the confidence as 1 to exp(−(lead − 1) / this): half of it is left if they bend the shapes alike. This
+ * is about how much the bend of one map varies with the triangles of its shapes: a pear on a box of 11 to 26 edges a
  * side has 0.041 to 0.055. Of 0.05, 0.07, 0.1, 0.15 and 0.2 it has the least squared error on the half `choose`. */
 static const double ORB_FIND_TIE = 0.1;
-/* The energy that a map whose energy is not known is taken to have: a bad one's. */
+/* The assumed energy of a map whose energy is not known: that of a bad one. */
 static const double ORB_FIND_SURE_UNMEASURED = 10;
 
 #endif

@@ -1,13 +1,13 @@
 /* A registration in space, as rigid as possible, that follows the composed map at first and then lets go of it
- * (elastic/elastic.h): where a landmark pulls the map out of place, the surface slides back. How far the registration
+ * (elastic/elastic.h). Where a landmark pulls the map out of place, the surface slides back. How far the registration
  * takes a landmark of one shape from its place on the other one is its drift. A landmark with a long drift in both
- * directions may be misplaced, and the drift ends near where it would lie.
+ * directions may be misplaced, and the drift ends near the right place.
  *
  * A landmark's share of the distortion is that of the map's triangles nearer to it than to any other landmark.
  *
  * Rejected: aligning coarse copies without each of the landmarks. The energies of two such maps differ by more than a
- * misplaced landmark costs: without one of 21 true landmarks, 2.26 fell to 1.69 or rose to 3.70, and it took 0.6 s
- * each. */
+ * misplaced landmark costs: without one of 21 true landmarks, 2.26 fell to 1.69 or rose to 3.70. It also took 0.6 s for
+ * each landmark. */
 #include "align/find/suspects.h"
 
 #include <math.h>
@@ -35,7 +35,7 @@ typedef struct side {
   orb_coarse_copy copy;
   double scale, middle[3], diagonal;
   int32_t *to;   /* the vertex of the other copy, for each vertex of this one */
-  double *image; /* where the map takes it, in the other one's scaled space; 3 a vertex */
+  double *image; /* where the map takes it, in the other one's scaled space; 3 per vertex */
 } side;
 
 static void side_free(orb_context *ctx, side *s) {
@@ -97,8 +97,8 @@ end:
   return status;
 }
 
-/* Where the registration of one side to the other takes the landmarks: the nearest places on the given mesh. at: the
- * landmarks' positions on `from`, scaled. */
+/* Finds where the registration of one side to the other takes the landmarks: the nearest places on the given mesh. at:
+ * the landmarks' positions on `from`, scaled. */
 static orb_status carry_landmarks(orb_context *ctx, const side *from, const side *to, const double *at, int32_t count,
                                   orb_place *out) {
   const orb_rough_map map = {from->to, to->to};
@@ -210,7 +210,7 @@ static orb_status measure_shares(orb_context *ctx, const side *a, const orb_land
   return ORB_OK;
 }
 
-/* Puts a suspect in its place by falling drift; the last of a full list drops out. */
+/* Inserts a suspect by falling drift; a full list drops its last one. */
 static void add_suspect(orb_alignment *out, const orb_suspect *one) {
   int32_t i = out->suspect_count;
   if (i < ORB_SUSPECTS_MAX) {

@@ -1,7 +1,7 @@
-/* Which given landmarks cost much of the distortion.
+/* Which given landmarks cause much of the distortion.
  *
- * Comes in: an alignment with given landmarks, and its shapes. Goes out: the landmarks that may be misplaced, and where
- * the others would put them. */
+ * In: an alignment with given landmarks, and its shapes. Out: the landmarks that may be misplaced, and where the others
+ * would put them. */
 #ifndef ORB_ALIGN_FIND_SUSPECTS_H
 #define ORB_ALIGN_FIND_SUSPECTS_H
 

@@ -2,16 +2,16 @@
  *
  * Two embeddings that are each optimal do not correspond: the look of a morph depends on the map from one shape to the
  * other. So the embedding of the fixed shape is kept. The moving shape is decimated, with its landmarks kept, and
- * refined anew: every vertex has a place on the fixed shape and moves there by Newton steps of the symmetric Dirichlet
- * energy of the composed map (engine/step.c). Of two shapes, the one moves whose triangles can follow the other
+ * refined anew. Every vertex has a place on the fixed shape and moves there by Newton steps of the symmetric Dirichlet
+ * energy of the composed map (engine/step.c). Of two shapes, the one whose triangles can follow the other one moves
  * (swap.c).
  *
- * Mirror landmarks join the landmarks where both shapes are symmetric (starts/mirror.c). They are held like landmarks,
+ * Mirror landmarks join the landmarks if both shapes are symmetric (starts/mirror.c). They are held like landmarks,
  * unless a start is nearly a map with them and a better map without them.
  *
  * With landmarks, the caller asks for the quick way first (walked.c): a landmark walk, optimised on a coarse level and
  * refined. For shapes in other poses, it then gives spatial targets that take the landmarks near their partners
- * (targets.c). Where neither gives a map, there are three kinds of starts:
+ * (targets.c). If neither gives a map, there are three kinds of starts:
  * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c), which
  *   samples by eigenfunctions guide where they agree with the landmarks (starts/spectral_samples.c). This is good where
  *   it folds little. Flips are allowed against a growing barrier until untangling clears nearly all; collapses clear
@@ -21,12 +21,12 @@
  *   (starts/landmark_walk.c). It has no flips from the beginning.
  * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
  *
- * Where spatial targets are given, there are other starts, and limbs are untwisted only at the end (targets.h). Then
- * the map slides to where the shapes fit each other in space (slide.h).
+ * If spatial targets are given, other starts are used, and limbs are untwisted only at the end (targets.h). Then the
+ * map slides to where the shapes fit each other in space (slide.h).
  *
  * Each start (start.h) is then refined up to all vertices, and no flip is allowed again. The map of least energy wins
- * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c) before the
- * moving shape is registered again through samples of it, and at the end.
+ * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c), once before
+ * the moving shape is registered again through samples of it, and once at the end.
  *
  * A large shape is not moved as a whole: it is the fixed one, or a decimated copy of it has its map already, which is
  * refined (lifted.c).
@@ -126,7 +126,7 @@ static orb_status walk_pairs(orb_map_run *c, int *stuck) {
   return ORB_OK;
 }
 
-/* Makes a map in which all pairs meet, for the starts that need one, by a landmark walk; where none is found, drops the
+/* Makes a map in which all pairs meet, for the starts that need one, by a landmark walk. If it finds none, drops the
  * mirror landmarks. */
 static orb_status meet_pairs(orb_map_run *c) {
   int stuck;
@@ -146,7 +146,7 @@ static orb_status meet_pairs(orb_map_run *c) {
 }
 
 /* Untwists limbs before the moving shape is registered again through samples of the best map: spatial targets that
- * follow a twist keep it. If that helped, the registrations that follow get some work again. */
+ * follow a twist keep it. If that helps, the registrations that follow get some work again. */
 static orb_status untwist_early(orb_map_run *c, double most_kept) {
   double twisted = c->best_energy;
   int64_t least = c->params.work.untwisted * (int64_t)c->vertex_count;
@@ -157,7 +157,7 @@ static orb_status untwist_early(orb_map_run *c, double most_kept) {
 
 /* A rough map of high energy that is thin halfway through the morph has twisted limbs: it folds when it is drawn to its
  * spatial targets, and samples of it are twisted too. So limbs are untwisted before it is drawn. If that does not help,
- * the draws keep their work. */
+ * the work stays for the draws. */
 static orb_status untwist_first(orb_map_run *c) {
   double before = c->best_energy;
   int64_t work = c->work;
@@ -169,8 +169,9 @@ static orb_status untwist_first(orb_map_run *c) {
   return ORB_OK;
 }
 
-/* After a start from spatial targets that is nearly a map: one more without the mirror landmarks, since one that is a
- * little off its true place folds what the landmarks alone do not. If that is no better, everything is restored. */
+/* After a start from spatial targets that is nearly a map: one more without the mirror landmarks. A mirror landmark
+ * that is a little off its true place folds what the landmarks alone do not. If the new start is no better, everything
+ * is restored. */
 static orb_status start_without_mirror_landmarks(orb_map_run *c) {
   orb_context *ctx = c->ctx;
   size_t n = (size_t)c->vertex_count;
@@ -241,7 +242,7 @@ static orb_status run_walk(orb_map_run *c) {
   return status;
 }
 
-/* Chooses the starts by what is known of the map as given. */
+/* Chooses the starts by what the map as given says. */
 static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   /* A good map without landmarks is kept: symmetric shapes have others that are as good. */
   if (c->pairs.landmarks == 0 && !c->keeps_angles && c->best_energy <= c->params.energy.good) {
@@ -260,7 +261,8 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   return run_starts(c, from, preset);
 }
 
-/* Optimises the map as given, which keeps its limbs where they are. Mirror landmarks would hold what is to be let go.
+/* Optimises the map as given, which keeps its limbs where they are. Drops mirror landmarks: they would hold what must
+ * be let go.
  */
 static orb_status let_go(orb_map_run *c) {
   c->pairs.count = c->pairs.landmarks;
@@ -269,7 +271,7 @@ static orb_status let_go(orb_map_run *c) {
   return orb_map_run_start(c, ORB_MAP_GIVEN);
 }
 
-/* Where lengths alone have led to a map of shapes that correspond. */
+/* Should the map slide? Yes, if lengths alone have led to a map of shapes that correspond. */
 static int should_slide(const orb_map_run *c, orb_map_from from) {
   return c->given_target ? c->keeps_angles : from == ORB_MAP_FROM_WALK && c->best_energy <= c->params.energy.good;
 }

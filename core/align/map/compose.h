@@ -1,8 +1,8 @@
 /* The composed map: lowering the distortion of the map from one shape to another through the sphere, instead of that of
  * each shape's own embedding. compose.c describes the method.
  *
- * Comes in: two aligned shapes, whose landmarks share points of the sphere. Goes out: new points of the moving shape,
- * certified, under which the map has less energy. Read in this order:
+ * In: two aligned shapes, whose landmarks share points of the sphere. Out: new points of the moving shape, certified,
+ * under which the map has less energy. Read in this order:
  *
  *   engine/   the optimiser: levels of the moving shape on the fixed one, and all parameters (engine/params.h)
  *   starts/   first maps: mirror landmarks, non-rigid registration, the landmark walk

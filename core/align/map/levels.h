@@ -24,11 +24,11 @@ void orb_map_level_store(orb_map_run *run, const orb_map_level *level, orb_refin
 
 /* Undoes collapses up to the next level. New vertices take some steps at once; with a pull, all vertices try their
  * spatial targets. known: room for a flag of each vertex. *has_room 0: crumples leave a vertex no room, and the refiner
- * and the level are of no more use. */
+ * and the level cannot be used any more. */
 ORB_MUST_CHECK orb_status orb_map_level_next(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
                                              unsigned char *known, double pull, int *has_room);
 
-/* Refines a level without flips up to all vertices. rough: only so far that samples of the map are of use. *failed: a
+/* Refines a level without flips up to all vertices. rough: only so far that samples of the map are useful. *failed: a
  * level has flips, covers the sphere twice, or leaves a vertex no room. */
 ORB_MUST_CHECK orb_status orb_map_levels_refine(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
                                                 double pull, int rough, int *failed);

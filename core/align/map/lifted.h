@@ -4,8 +4,8 @@
 
 #include "align/map/engine/run.h"
 
-/* Starts at the level of the moving shape that has a map, and takes its hierarchy over. The result becomes run->best.
- * Where flips of the level cannot be cleared, run->best_energy stays what it is. */
+/* Starts at the level of the moving shape that has a map, and takes ownership of its hierarchy. The result becomes
+ * run->best. If flips of the level cannot be cleared, run->best_energy stays as it is. */
 ORB_MUST_CHECK orb_status orb_map_lift(orb_map_run *run, const orb_map_level_map *copy);
 
 #endif

@@ -5,8 +5,9 @@
 
 #include "align/map/engine/run.h"
 
-/* Replaces the best map, which needs its places on the fixed shape as it is now, unless it would cost more energy than
- * params.slide.most allows, or `below` and more: only a map below the energy of the alignment as given is kept. */
+/* Replaces the best map, which must have its places on the current fixed shape, unless that would cost more energy than
+ * params.slide.most allows, or raise the energy to `below` or more: only a map below the energy of the alignment as
+ * given is kept. */
 ORB_MUST_CHECK orb_status orb_map_slide(orb_map_run *run, double below);
 
 #endif

@@ -19,9 +19,9 @@ static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level
                              flips);
 }
 
-/* Clears the flips of a start's first level. *flips: those left; a finer level may clear them, unless *given_up: the
- * start is dropped, which is not an error: another start, or the given alignment, remains. One that covers the sphere
- * twice is dropped here: sweeps without flips keep it so. */
+/* Clears the flips of a start's first level. *flips: those left, which a finer level may clear. *given_up: the start is
+ * dropped, which is not an error: another start, or the given alignment, remains. A start that covers the sphere twice
+ * is dropped here, because sweeps without flips would keep it so. */
 static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
                               int32_t *flips, int *given_up) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;

@@ -1,16 +1,15 @@
-/* The targets are smoothed first, by a registration in space through samples of them, if the first level then has
- * fewer flips. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h) clears what
- * flips are left. Where the targets are folded it has crumpled, in the pockets of a face and where limbs touch. So it
- * is ironed (engine/iron.h) and drawn to the targets at once, which smooths most of it. Where that leads to no map of
- * shapes that correspond, passes through samples of the best map follow, and then two more starts, until one is such a
- * map: from the targets as given on a coarser level, and from those that the first start has not followed on the usual
- * one. Then passes and a draw bring the energy down. Passes come first: they find a better basin, and a draw only the
- * bottom of one. Where no pass helps, the map is drawn to the given targets.
+/* The targets are smoothed first, by a registration in space through samples of them, if the first level then has fewer
+ * flips. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h) clears the remaining
+ * flips. Where the targets are folded the map has crumpled, as in the pockets of a face and where limbs touch. So it is
+ * ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples. If that leads to no map of
+ * shapes that correspond, passes through samples of the best map follow. Then come two more starts, until one is such a
+ * map: from the targets as given on a coarser level, and on the usual level from the targets that the first start has
+ * not followed. Then passes and a draw bring the energy down. Passes come first: they find a better basin, and a draw
+ * only the bottom of one. If no pass helps, the map is drawn to the given targets.
  *
- * Where that gives no such map, samples of the targets guide landmark walks (walked.h). A walk begins without flips
- * and is optimised on a coarse level, so several are tried, and the best one is refined. Where the caller says so, a
- * walk comes first, and takes the place of all starts: of 30 pairs of other kinds, it led to the map that was kept
- * in 22. */
+ * If none of these gives such a map, samples of the targets guide landmark walks (walked.h). A walk begins without
+ * flips and is optimised on a coarse level, so several are tried, and the best one is refined. If the caller says so, a
+ * walk comes first, and replaces all starts: of 30 pairs of other kinds, it led to the map that was kept in 22. */
 #include "align/map/targets.h"
 
 #include <math.h>
@@ -21,19 +20,19 @@
 #include "align/map/walked.h"
 #include "base/check.h"
 
-/* Each step gets work of its own: a start that is given up must not starve the next. */
+/* Each step gets its own work: a start that is given up must not starve the next. */
 static void allow(orb_map_run *c) {
   int64_t least = c->params.targets.work * (int64_t)c->vertex_count;
   c->work = c->work > least ? c->work : least;
 }
 
-/* Up to which a map is not improved. */
+/* The energy up to which a map is not improved. */
 static double good_energy(const orb_map_run *c) {
   return c->keeps_angles ? c->params.energy.good : c->params.targets.alike;
 }
 
-/* Up to which a map from a start is not improved: landmarks hold crumples that others lose, and a map with them is then
- * worth more time. */
+/* The energy up to which a map from a start is not improved. Landmarks hold crumples that other maps lose, and a map
+ * with landmarks is then worth more time. */
 static double smooth_energy(const orb_map_run *c) {
   return c->pairs.landmarks > 0 && !c->keeps_angles ? c->params.targets.alike : good_energy(c);
 }
@@ -48,10 +47,10 @@ static orb_status smooth_targets(orb_map_run *c) {
   return status;
 }
 
-/* The targets of the first start: the smooth ones, or those as given where they fold it less, as where limbs lie beside
- * each other, which a registration in space moves together. Walks take samples of the targets themselves. Landmarks
- * have drawn the targets, and maps from smooth ones are then no better: of 20 pairs of people with 24 of them, neither
- * errors nor energies differ. */
+/* Sets the targets of the first start: the smooth ones, or those as given if they fold it less, for example if limbs
+ * lie beside each other and a registration in space moves them together. Walks take samples of the targets
+ * themselves. If landmarks have drawn the targets, maps from smooth ones are no better: of 20 pairs of people with 24
+ * landmarks, neither errors nor energies differ. */
 static orb_status register_first(orb_map_run *c) {
   int32_t smooth, given;
   ORB_TRY(orb_map_levels_prepare(c));
@@ -132,7 +131,7 @@ static orb_status run_first(orb_map_run *c, int *walked) {
   return ORB_OK;
 }
 
-/* What leads on from the first start, until there is a map of shapes that correspond. */
+/* Continues from the first start, until there is a map of shapes that correspond. */
 static orb_status run_starts(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   if (c->best_energy > smooth_energy(c) && c->best_energy <= p->targets.crumpled) {
@@ -153,7 +152,7 @@ static orb_status improve_walked(orb_map_run *c) {
   return c->best_energy > good_energy(c) && c->best_energy <= c->params.energy.poor ? run_passes(c) : ORB_OK;
 }
 
-/* A walk where all starts have led to no map of shapes that correspond. *walked: it leads to the best map. */
+/* A walk, if all starts have led to no map of shapes that correspond. *walked: it leads to the best map. */
 static orb_status walk_last(orb_map_run *c, int *walked) {
   const double before = c->best_energy;
   ORB_TRY(orb_map_register(c, 0));
@@ -162,7 +161,7 @@ static orb_status walk_last(orb_map_run *c, int *walked) {
   return ORB_OK;
 }
 
-/* Leads on from the map of all starts: passes, which find a better basin, then a draw to its bottom. */
+/* Continues from the map of all starts: passes, which find a better basin, then a draw to its bottom. */
 static orb_status improve_started(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   const double started = c->best_energy;

@@ -56,7 +56,7 @@ done:
   return status;
 }
 
-/* Gives the run this map's sphere and hierarchy. */
+/* Gives this map's sphere and hierarchy to the run. */
 static orb_status enter(orb_map_run *c, orb_map_walked *w) {
   double *fixed = ORB_NEW(c->ctx, double, 3 * (size_t)c->fixed->mesh.vertex_count);
   if (!fixed) {
@@ -69,7 +69,7 @@ static orb_status enter(orb_map_run *c, orb_map_walked *w) {
   return status;
 }
 
-/* Takes them back. */
+/* Takes them back from the run. */
 static orb_status leave(orb_map_run *c, orb_map_walked *w) {
   w->hierarchy = c->hierarchy;
   c->hierarchy = NULL;

@@ -10,20 +10,20 @@ typedef struct orb_map_walked {
   orb_hierarchy *hierarchy; /* NULL: the run has it */
   orb_refiner *refiner;
   orb_map_level level;
-  double *fixed; /* points of the fixed shape, 3 a vertex */
+  double *fixed; /* points of the fixed shape, 3 per vertex */
   double energy; /* INFINITY: there is no map, or it is hopeless */
 } orb_map_walked;
 
 /* Walks, and optimises the levels up to the coarse one. guides: samples of the spatial targets that walk with the
- * pairs, and are free afterwards. Only without them is a map hopeless by its energy. Afterwards the run is as it was.
- * Free `out` in any case. */
+ * pairs, and are free afterwards. Only a map without guides can be hopeless by its energy. Afterwards the run is as it
+ * was. Free `out` in any case. */
 ORB_MUST_CHECK orb_status orb_map_walked_create(orb_map_run *run, int32_t guides, orb_map_walked *out);
 /* Walks with different numbers of guides; the map of least energy replaces `best` if it is better. */
 ORB_MUST_CHECK orb_status orb_map_walked_improve(orb_map_run *run, orb_map_walked *best);
 void orb_map_walked_free(orb_map_run *run, orb_map_walked *walked);
 
-/* Refines to all vertices; the result becomes the best map if it is better. Its energy is INFINITY if a level has
- * flips. `walked` is spent otherwise. */
+/* Refines to all vertices; the result becomes the best map if it is better. If a level has flips, its energy is
+ * INFINITY. Otherwise `walked` is used up. */
 ORB_MUST_CHECK orb_status orb_map_walked_refine(orb_map_run *run, orb_map_walked *walked);
 
 #endif

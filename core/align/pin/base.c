@@ -14,8 +14,8 @@ enum {
   FRAMES = 40, /* rotations of the octahedron that are tried; chosen by trial */
   PASSES = 60  /* of edge flips; a guard against rounding */
 };
-/* Radians by which the phases of two vectors grow from frame to frame and from axis to axis, and a first phase. Any
- * values do that spread the frames: no multiple of one is near a multiple of 2π. */
+/* The phases of two vectors grow by these radians from frame to frame and from axis to axis, from a first phase. Any
+ * values that spread the frames will do: no multiple of one is near a multiple of 2π. */
 static const double FIRST_BY_FRAME = 1.3, FIRST_BY_AXIS = 2.1, FIRST_PHASE = 0.4;
 static const double SECOND_BY_FRAME = 2.7, SECOND_BY_AXIS = 1.7;
 /* Six times the volume of the tetrahedron of two triangles, of points on the unit sphere: an edge flip that gains less
@@ -100,7 +100,7 @@ static int should_flip(const orb_sheet *s, int32_t h) {
   return orb_dot(n, w) > LEAST_GAIN && positive(s, a, d, c) && positive(s, d, b, c);
 }
 
-/* Lawson's edge flips. They end without the bound on passes, except for rounding. */
+/* Lawson's edge flips. They end by themselves; the bound on passes only guards against rounding. */
 static void improve(orb_sheet *s) {
   int32_t half_edges = 3 * s->shape.mesh.triangle_count;
   for (int pass = 0, flipped = 1; flipped && pass < PASSES; pass++) {

@@ -21,7 +21,7 @@
 /* Chosen by trial. */
 static const double SLACK = 2;     /* a pair is taken although it is longer than the next one by up to this factor */
 static const double LONGEST = 200; /* chords of the unit sphere, summed: longer pairs are taken without a search */
-enum { MANY = 45 };                /* landmarks from which one search for all paths from a landmark is faster */
+enum { MANY = 45 };                /* from this many landmarks on, one search for all paths from a landmark is faster */
 
 /* A pair of landmarks that an edge may join. */
 typedef struct end_pair {

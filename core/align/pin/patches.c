@@ -20,7 +20,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { ITERATIONS = 4000 };          /* most, of conjugate gradients; a guard: the residual ends them before */
+enum { ITERATIONS = 4000 };          /* most steps of conjugate gradients; a guard: the residual ends them earlier */
 static const double SETTLED = 1e-30; /* squared norm of the residual, relative to the first, that ends them */
 static const double WEIGHT_LEAST = 0.1, WEIGHT_MOST = 10; /* cotangent weights are clamped to this range */
 

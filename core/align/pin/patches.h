@@ -5,7 +5,7 @@
 #include "align/pin/paths.h"
 #include "align/pin/room.h"
 
-/* Embeds one shape so that its landmarks lie at the targets (3 a landmark, distinct, unit): traces the edges of a
+/* Embeds one shape so that its landmarks lie at the targets (3 per landmark, distinct, unit): traces the edges of a
  * triangulation of the targets as paths on the shape's sphere, splitting edges as needed, embeds each patch in its
  * spherical triangle, and relaxes. *held 0: rounding broke the result or the room does not suffice, and the sheet is
  * unchanged. */

@@ -25,7 +25,7 @@ static const double GROWTH_SMALL = 0.35;
 /* Visits of nodes and vertices, see orb_pin_room, of each trial in the search for the landmark to name. */
 static const int64_t WORK_OF_TRIAL = 80000000;
 
-/* Carries all other shapes onto the landmarks of shape 0, whose embedding stays. *stuck: the first shape for which that
+/* Moves all other shapes onto the landmarks of shape 0, whose embedding stays. *stuck: the first shape for which that
  * failed; 0: none. */
 static orb_status carry_onto_first(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                                    int32_t count, orb_preset preset, orb_pin_room *room, int32_t *stuck) {
@@ -47,8 +47,8 @@ end:
   return status;
 }
 
-/* Tries one way after the other. *held 0: all failed, the last on shape *shape, and sheets may have been rotated or
- * refined. */
+/* Tries the ways one after the other. *held 0: all failed, the last on shape *shape, and sheets may have been rotated
+ * or refined. */
 static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                        int32_t count, const orb_align_options *options, int64_t work, int *held, int32_t *shape) {
   orb_preset preset = options->preset;

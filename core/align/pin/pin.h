@@ -1,7 +1,7 @@
 /* Method `pin`: landmarks as constraints of the embeddings.
  *
- * Comes in: sheets with landmarks. Goes out: the same, embedded again so that the landmarks coincide, certified;
- * perhaps with more edges. Read in this order:
+ * In: sheets with landmarks. Out: the same sheets, embedded again so that the landmarks coincide, certified; perhaps
+ * with more edges. Read in this order:
  *
  *   walk.h         landmarks walk to common targets on a coarse level: nearly all requests end here
  *   relax.h        sweeps with landmarks held

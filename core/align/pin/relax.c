@@ -11,11 +11,11 @@
 /* Chosen by trial. */
 enum {
   ROUNDS = 24,       /* most, of thinning */
-  ROUND_SWEEPS = 5,  /* after each, so that the next finds more to remove */
+  ROUND_SWEEPS = 5,  /* after each round, so that the next one finds more to remove */
   SWEEPS = 60,       /* most, at the end */
   CHECKED_SWEEPS = 5 /* between checks whether to go on */
 };
-static const double LITTLE = 0.02;  /* of the new vertices: a round that removes less is the last */
+static const double LITTLE = 0.02;  /* share of the new vertices: a round that removes less is the last */
 static const double SETTLED = 1e-3; /* gain of the energy by CHECKED_SWEEPS sweeps that ends them */
 
 orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,

@@ -1,7 +1,8 @@
 /* How far a sheet may grow. */
 #include "align/pin/room.h"
 
-/* Triangles, see orb_align_options.max_growth: a smaller sheet grows as if it had SMALL; none grows by more than MOST.
+/* Triangles, see orb_align_options.max_growth: a smaller sheet may grow as if it had SMALL; none grows by more than
+ * MOST.
  */
 enum { SMALL = 2000, MOST = 800000 };
 

@@ -10,7 +10,7 @@ typedef struct orb_pin_room {
   int64_t work;  /* visits of nodes and vertices that are left; when it is spent, the landmarks count as not met */
 } orb_pin_room;
 
-/* What `pin` may use up for one alignment, and `rbf` where it falls back on the patches of pin. */
+/* What `pin` may use up for one alignment, and `rbf` if it falls back on the patches of pin. */
 static const double ORB_PIN_GROWTH = 64; /* default of orb_align_options.max_growth: for landmarks in another order */
 static const int64_t ORB_PIN_WORK = 500000000; /* visits: about a minute; 150 random landmarks take a few seconds */
 

@@ -1,9 +1,10 @@
 /* Straightens paths as soon as they are laid.
  *
- * A path crosses every edge in its way, also those that earlier splits left within a given triangle, and each crossing
- * adds a vertex and two triangles: of paths that run side by side, each would cross half as many edges again as the one
- * before it. So a vertex of the path within a given triangle is collapsed along the path where that changes no shape.
- * Mostly the crossings of edges of the given mesh remain, and the sheet grows by the same number from path to path.
+ * A path crosses every edge in its way, including those that earlier splits left within a given triangle, and each
+ * crossing adds a vertex and two triangles. Of paths that run side by side, each would cross half as many edges again
+ * as the one before it. So a vertex of the path within a given triangle is collapsed along the path if that changes no
+ * shape. Mostly the crossings of edges of the given mesh remain, and the sheet grows by the same number from path to
+ * path.
  */
 #include <math.h>
 #include <string.h>

@@ -40,7 +40,7 @@ typedef struct walker {
   orb_sheet *sheet;
   orb_hierarchy *hierarchy;
   orb_refiner *refiner;
-  const int32_t *landmarks; /* which of the request */
+  const int32_t *landmarks; /* numbers of the landmarks in the request */
   int32_t count;
   int32_t *vertices, *triangles; /* of the current level */
   int32_t vertex_count, triangle_count;

@@ -9,7 +9,7 @@
 typedef struct orb_walk_level {
   orb_hierarchy *hierarchy; /* at its tetrahedron; its landmarks, and no other vertices, were kept */
   int32_t live;             /* vertices of the level */
-  double *points;           /* of those, 3 a vertex of the mesh */
+  double *points;           /* of those, 3 per vertex of the mesh */
 } orb_walk_level;
 
 typedef struct orb_walk_options {

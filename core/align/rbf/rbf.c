@@ -32,7 +32,7 @@ enum {
   RELAX_SWEEPS = 20 /* of a relaxation */
 };
 static const double DEFAULT_RADIUS = 1.0; /* chord on the unit sphere: a sixth of the circumference */
-static const double LAST_SHARE = 1e-9; /* of the way: less is rounding of the sum of steps, and belongs to the last */
+static const double LAST_SHARE = 1e-9; /* of the way: less is rounding of the sum of steps, and joins the last step */
 static const double LEAST_MEAN = 1e-3; /* length of a mean of unit vectors: opposite points have no shorter one */
 
 typedef struct rbf_run {
@@ -50,7 +50,7 @@ static int32_t vertex_of(const rbf_run *r, int32_t k) {
   return r->sheet->shape.landmark_vertices[r->active[k]];
 }
 
-/* The point of landmark k after `share` of the way left; for all of it, the target bit for bit. */
+/* The point of landmark k after `share` of the remaining way; for the whole way, the target bit for bit. */
 static void next_place(const rbf_run *r, int32_t k, double share, double out[3]) {
   const double *p = r->sheet->shape.points + 3 * (size_t)vertex_of(r, k), *target = r->targets + 3 * (size_t)k;
   for (int c = 0; c < 3; c++) {

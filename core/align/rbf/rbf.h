@@ -1,6 +1,6 @@
 /* Method `rbf`: the warp by radial basis functions of Peng & Timalsena 2016, section 7.2.
  *
- * Comes in: sheets with landmarks. Goes out: the same with warped spheres, on which the landmarks coincide, certified.
+ * In: sheets with landmarks. Out: the same with warped spheres, on which the landmarks coincide, certified.
  * Read warp.h first: one warp. rbf.c takes it in small steps.
  */
 #ifndef ORB_ALIGN_RBF_RBF_H

@@ -13,7 +13,7 @@ double orb_warp_phi(double r);
  * in one plane) P is omitted. */
 typedef struct orb_warp {
   int32_t count;
-  double *centres, *coefficients, *radii; /* 3, 3 and 1 a centre */
+  double *centres, *coefficients, *radii; /* 3, 3 and 1 per centre */
   double linear[4][3];                    /* P(v) = linear[0] + Σ v_i linear[i + 1] */
 } orb_warp;
 

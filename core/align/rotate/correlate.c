@@ -39,7 +39,7 @@ static const double FIRST_STEP = 0.12, LAST_STEP = 0.002; /* radians of the patt
 static const double LEAST_CUBE =
     1e-9;           /* added to the cubed distance of a chord from the centre, by which areas are divided */
 enum { MOVES = 8 }; /* most rounds of it with one step */
-static const double UPRIGHT = 0.15; /* relative: an upright rotation may score less than the best by this share */
+static const double UPRIGHT = 0.15; /* relative: an upright rotation may score this much less than the best */
 static const double GOLDEN_ANGLE = 2.399963229728653; /* π (3 − √5): between neighbours of a Fibonacci lattice */
 
 /* Mean position (centred, unit variance) and normal (variance NORMALS) of each cell of the cube map. */
@@ -339,7 +339,7 @@ static void descend_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Keeps the highest points of the grid and refines them. spaced: starts that are far from each other are wanted. */
+/* Keeps the highest points of the grid and refines them. spaced: keeps starts that are far from each other. */
 static orb_status refine(search *s, int spaced) {
   for (int i = 0; i < STARTS; i++) {
     s->kept.upright[i].score = s->kept.best[i].score = -INFINITY;

@@ -11,7 +11,7 @@
 
 enum { ROUNDS = 100 };               /* most alternations */
 static const double SETTLED = 1e-12; /* gain of the spread by one, relative to it, that ends them */
-/* Of the mean of unit vectors: shorter, it has no direction (two opposite points), and the first shape's point serves.
+/* Shorter means of unit vectors have no direction (two opposite points); then the first shape's point is used.
  */
 static const double NO_MEAN = 1e-3;
 

@@ -26,7 +26,7 @@ ORB_MUST_CHECK orb_status orb_procrustes_covariance(orb_context *ctx, const doub
                                                     double singular[3]);
 
 /* Generalised Procrustes: the rotations of shapes 1, 2, … that bring landmarks together; shape 0 stays. points:
- * shape-major, 3 a landmark, not changed. rotations: 9 a shape. means (3 a landmark): the spherical means of the
+ * shape-major, 3 per landmark, not changed. rotations: 9 per shape. means (3 per landmark): the spherical means of the
  * rotated landmarks; where one does not exist, shape 0's point. */
 ORB_MUST_CHECK orb_status orb_procrustes_all(orb_context *ctx, const double *points, int32_t shape_count,
                                              int32_t landmark_count, double *rotations, double *means);

@@ -52,7 +52,9 @@ static int is_identity(const double r[9]) {
   return memcmp(r, one, sizeof one) == 0;
 }
 
-orb_status orb_sheet_rotate(orb_context *ctx, orb_sheet *sheet, const double rotation[9]) {
+/* Rotates the sphere points of a sheet and certifies the rounded result; tries slightly different rotations where
+ * rounding breaks a triangle. ORB_E_NOT_CERTIFIED if none is certified. The identity changes nothing. */
+static orb_status rotate_sheet(orb_context *ctx, orb_sheet *sheet, const double rotation[9]) {
   const orb_mesh *mesh = &sheet->shape.mesh;
   int32_t vertices = mesh->vertex_count;
   if (is_identity(rotation)) {
@@ -89,7 +91,7 @@ orb_status orb_rotate_by_search(orb_context *ctx, orb_sheet *sheets, int32_t sha
   for (int32_t s = 1; s < shape_count; s++) {
     double rotation[9];
     ORB_TRY(orb_rotation_search(ctx, &sheets[0].shape, &sheets[s].shape, rotation, NULL));
-    ORB_TRY(orb_sheet_rotate(ctx, &sheets[s], rotation));
+    ORB_TRY(rotate_sheet(ctx, &sheets[s], rotation));
     orb_progress(ctx, "align", (double)s / shape_count);
   }
   return ORB_OK;
@@ -111,7 +113,7 @@ orb_status orb_rotate_by_landmarks(orb_context *ctx, orb_sheet *sheets, int32_t 
   }
   ORB_GO(status, orb_rotations_find(ctx, shapes, points, shape_count, count, rotations, means), end);
   for (int32_t s = 0; s < shape_count; s++) {
-    ORB_GO(status, orb_sheet_rotate(ctx, &sheets[s], rotations + 9 * (size_t)s), end);
+    ORB_GO(status, rotate_sheet(ctx, &sheets[s], rotations + 9 * (size_t)s), end);
   }
 end:
   orb_free(ctx, points);

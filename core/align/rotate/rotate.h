@@ -1,6 +1,6 @@
 /* Method `rotate`: rotations of whole spheres, by landmarks or by search. Matrices are row-major: q = R p.
  *
- * Comes in: sheets, perhaps with landmarks. Goes out: the same with rotated spheres, certified. Read in this order:
+ * In: sheets, perhaps with landmarks. Out: the same with rotated spheres, certified. Read in this order:
  *
  *   procrustes.h  rotations by landmarks
  *   correlate.h   the search without landmarks, or with too few
@@ -17,15 +17,11 @@ ORB_MUST_CHECK orb_status orb_rotations_find(orb_context *ctx, const orb_aligned
                                              const double *points, int32_t shape_count, int32_t landmark_count,
                                              double *rotations, double *means);
 
-/* Rotates the sphere points of a sheet and certifies the rounded result; tries slightly different rotations where
- * rounding breaks a triangle. ORB_E_NOT_CERTIFIED if none is certified. The identity changes nothing. */
-ORB_MUST_CHECK orb_status orb_sheet_rotate(orb_context *ctx, orb_sheet *sheet, const double rotation[9]);
-
-/* Applies orb_rotations_find() to the spheres. */
+/* Applies orb_rotations_find() to the spheres, and certifies the results. */
 ORB_MUST_CHECK orb_status orb_rotate_by_landmarks(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
                                                   const int32_t *landmarks, int32_t count);
 
-/* Applies orb_rotation_search() to each later sphere. */
+/* Applies orb_rotation_search() to each later sphere, and certifies the results. */
 ORB_MUST_CHECK orb_status orb_rotate_by_search(orb_context *ctx, orb_sheet *sheets, int32_t shape_count);
 
 #endif

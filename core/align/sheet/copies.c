@@ -21,7 +21,7 @@ void orb_copies_free(orb_context *ctx, orb_copies *copies) {
   memset(copies, 0, sizeof *copies);
 }
 
-/* The whole shape with the landmarks as vertices. */
+/* Inserts the landmarks into the whole shape as vertices. */
 static orb_status insert_landmarks(orb_context *ctx, const orb_align_shape *shape, const orb_landmark *landmarks,
                                    int32_t landmark_count, int32_t s, orb_aligned_shape *out) {
   orb_sheet sheet;

@@ -1,8 +1,8 @@
 /* Embeddings for maps from shape to shape.
  *
  * The given embeddings keep areas. That stretches limbs on the sphere six times as much around as along: a straight
- * edge of one shape then cuts off so much of an arc of the other that one triangle in fourteen flips where the shapes
- * lie on each other. On spheres that keep angles half as many do. */
+ * edge of one shape then cuts off so much of an arc of the other one that one triangle in fourteen flips even where the
+ * shapes coincide. On spheres that keep angles half as many do. */
 #ifndef ORB_ALIGN_SHEET_EVEN_H
 #define ORB_ALIGN_SHEET_EVEN_H
 

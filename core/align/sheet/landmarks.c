@@ -16,7 +16,8 @@ static const double SNAP = 2e-7;     /* a landmark this near to an edge or corne
 static const double NEGATIVE = 1e-6; /* rounding below zero that is accepted, */
 static const double OFF_ONE = 1e-5;  /* and of their sum */
 
-/* Ways of a vertex towards the mean of its ring, as shares: from one that hardly moves it, in steps of this factor. */
+/* Shares of the way of a vertex towards the mean of its ring: the first hardly moves it; each is larger by this factor.
+ */
 static const double FIRST_WAY = 1e-6, WAY_GROWTH = 4;
 
 /* Vertex `vertex` lies in given triangle `triangle` at `at`. */
@@ -274,7 +275,7 @@ static int32_t shared(const orb_sheet *sheets, int32_t shape_count, int32_t i, i
   return same;
 }
 
-/* Landmarks i and j share a vertex on `shape` but not on every shape: names all landmarks of which that is true. */
+/* Landmarks i and j share a vertex on `shape` but not on every shape: the error names all landmarks that do. */
 static orb_status contradiction(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count, int32_t landmark_count,
                                 int32_t i, int32_t j, int32_t shape) {
   orb_status status = orb_fail(ctx, ORB_E_BAD_LANDMARKS,

@@ -16,7 +16,7 @@ ORB_MUST_CHECK orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet
 ORB_MUST_CHECK orb_status orb_landmarks_distinct(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count,
                                                  int32_t landmark_count, int32_t *unique, int32_t *unique_count);
 
-/* The current sphere points of landmarks, shape-major, 3 a landmark. The caller frees them. */
+/* The current sphere points of landmarks, shape-major, 3 per landmark. The caller frees them. */
 ORB_MUST_CHECK orb_status orb_landmark_points(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count,
                                               const int32_t *landmarks, int32_t count, double **out);
 

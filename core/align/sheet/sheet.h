@@ -1,8 +1,8 @@
 /* The working copy of a shape: a surface with its embedding that can be refined in place. Splits act on the surface and
  * on the sphere at once and change no shape.
  *
- * Comes in: a mesh, its embedding, and landmarks as places on it. Goes out: the refined mesh and its embedding, with
- * landmarks as vertices. Read in this order:
+ * In: a mesh, its embedding, and landmarks as places on it. Out: the refined mesh and its embedding, with landmarks as
+ * vertices. Read in this order:
  *
  *   sheet.h      the working copy, and splits
  *   landmarks.h  landmarks as vertices

@@ -16,7 +16,8 @@
 
 /* Chosen by trial. */
 enum { PASSES = 4 }; /* over all vertices */
-/* A collapse must leave this fatness of the star (see orb_fatness()), or this share of what it is if that is less. */
+/* A collapse must leave this fatness of the star (see orb_fatness()), or this share of its current fatness if that is
+ * less. */
 static const double THIN = 0.03, KEPT = 0.5;
 
 typedef struct thinner {

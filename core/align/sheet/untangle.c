@@ -14,7 +14,7 @@
 
 /* Chosen by trial. */
 enum {
-  RINGS = 6,  /* around the flips that may move: 0, then one more each time, less than this */
+  RINGS = 6,  /* rings around the flips that may move: 0 at first, then one more each time, fewer than this */
   ROUNDS = 24 /* of moves for each number of rings, if vertices still move */
 };
 /* Share of the way to a goal that a move tries: the whole, then halves, as long as they exceed this. */

@@ -21,9 +21,9 @@
 
 enum {
   GRAIN = 4096,   /* triangles of a chunk */
-  DIRECTIONS = 64 /* tried before the degree counts as 0; a map that is not degenerate spoils one only by coincidence */
+  DIRECTIONS = 64 /* to try before the degree counts as 0; only coincidence spoils one, unless the map is degenerate */
 };
-/* Cosine to x of corners that are certainly on the far side: well beyond rounding. */
+/* A corner whose cosine to x is below this is certainly on the far side: it is well beyond rounding. */
 static const double FAR_SIDE = -1e-9;
 
 typedef struct partial {
@@ -39,7 +39,7 @@ typedef struct certify_job {
   partial *chunk;
 } certify_job;
 
-/* +1 or −1 if the triangle covers x with that sign, 0 if not; counts *on_edge where x is not in general position. */
+/* +1 or −1 if the triangle covers x with that sign, 0 if not; adds 1 to *on_edge if x is not in general position. */
 static int covers(const double *p, const double *q, const double *r, const double x[3], int sign, int64_t *on_edge) {
   if (orb_dot(p, x) < FAR_SIDE && orb_dot(q, x) < FAR_SIDE && orb_dot(r, x) < FAR_SIDE) {
     return 0; /* x·x > 0 needs a corner on the side of x */

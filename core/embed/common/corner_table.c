@@ -15,8 +15,8 @@ enum {
 
 static const double PI = 3.14159265358979323846;
 static const double AREA_FLOOR = 1e-7; /* least target area of a triangle, as a share of the mean */
-/* Whole areas of a mesh in the box [−1, 1]³: below THIN the scale stops growing, so that floats hold the positions;
- * below VANISHING areas are rounding, and all triangles count alike. */
+/* Total areas of a mesh in the box [−1, 1]³. Below THIN the scale stops growing, so that floats can hold the positions.
+ * Below VANISHING, areas are rounding errors, and all triangles count alike. */
 static const double THIN = 1e-12, VANISHING = 1e-30;
 
 typedef struct setup {
@@ -210,8 +210,8 @@ static orb_status list_incidences(setup *w) {
   return orb_context_check(w->ctx);
 }
 
-/* The corner opposite to c, −1 if there is none. Its triangle has the edge from b to a; the search goes over the
- * corners of the end that has fewer, so that a pole of any valence costs little. */
+/* The corner opposite to c, −1 if there is none. Its triangle has the edge from b to a. The search visits the corners
+ * of whichever end has fewer, so that a pole of any valence costs little. */
 static int32_t find_opposite(const setup *w, int32_t c) {
   const orb_corner_table *s = w->s;
   int32_t a = s->corner[orb_corner_next(c)], b = s->corner[orb_corner_prev(c)];

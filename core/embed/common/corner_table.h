@@ -14,9 +14,9 @@
 typedef struct orb_corner_table {
   int32_t vertex_count, triangle_count;
   int32_t *to_mesh, *from_mesh; /* vertex numbers: from Morton order to the mesh's own, and back */
-  double *position;             /* 3 a vertex; centred, area 4π (but see orb_corner_table_create) */
-  float *position4;             /* the same as floats, 4 a vertex; the last is the vertex's valence */
-  int32_t *corner, *opposite;   /* 8 a triangle; opposite = corner + 4 */
+  double *position;             /* 3 per vertex; centred, area 4π (but see orb_corner_table_create) */
+  float *position4;             /* the same as floats, 4 per vertex; the last is the vertex's valence */
+  int32_t *corner, *opposite;   /* 8 per triangle; opposite = corner + 4 */
   int32_t *vertex_corner;       /* a corner of each vertex */
   int32_t *valence;             /* of each vertex */
 } orb_corner_table;

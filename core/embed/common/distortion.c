@@ -21,10 +21,10 @@
 enum { DIRICHLET = 0, ANGLE, AREA, ASPECT, MEASURES };
 enum {
   GRAIN = 4096,  /* triangles of a chunk */
-  FINE = 1 << 16 /* fine bins: 64 octaves, or logarithms of area from −32 to 32; the last ones take what is beyond */
+  FINE = 1 << 16 /* fine bins: 64 octaves, or logarithms of area from −32 to 32; the outermost take the rest */
 };
 
-static const double ZERO_AREA = 1e-13; /* |U×W| over U² + W² up to which an area is rounding */
+static const double ZERO_AREA = 1e-13; /* an area is rounding while |U×W| / (U² + W²) is at most this */
 static const double LARGEST = 1e300;   /* stands for infinite values, so that sums stay finite */
 
 typedef struct moments {
@@ -210,7 +210,7 @@ static int compare_weighted(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* The least value whose weight, with that of all smaller ones, reaches `share` of the whole. */
+/* The least value at which the cumulative weight reaches `share` of the total. */
 static orb_status percentile(measure_job *job, int measure, const fine_bins *fine, double share, double *out) {
   double want = share * job->total[measure].weight, below = 0;
   int32_t bin = 0;

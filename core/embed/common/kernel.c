@@ -11,7 +11,7 @@
 
 enum { HALVINGS = 50 }; /* of the distance to r_0: 2⁻⁵⁰ is near the spacing of doubles */
 
-/* Chart coordinates: a chart reaches at most so far, that is 84° from r_0. */
+/* In chart coordinates: a chart reaches this far at most, which is 84° from r_0. */
 static const double CHART_RADIUS = 10;
 
 /* A half-plane of the chart: s·x + t·y + at > 0, (x, y) of unit length. */
@@ -140,7 +140,7 @@ static chart_point centroid(const chart *c) {
   return (chart_point){.s = p[0].s + ms, .t = p[0].t + mt};
 }
 
-/* Takes a point of the chart to the sphere; whether it lies in the kernel. */
+/* Maps a point of the chart to the sphere. Returns whether it lies in the kernel. */
 static int lift(const chart *c, const double (*ring)[3], chart_point q, double out[3]) {
   for (int k = 0; k < 3; k++) {
     out[k] = c->origin[k] + q.s * c->e1[k] + q.t * c->e2[k];

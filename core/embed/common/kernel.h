@@ -18,7 +18,7 @@ void orb_kernel_room_free(orb_context *ctx, orb_kernel_room *room);
 /* Finds a point well inside the kernel of a ring whose triangles r_0 r_i r_{i+1} are all positive, as after a vertex
  * split. In exact arithmetic such a kernel is never empty; *found is 0 where doubles cannot hold a point of it. The
  * kernel is clipped in the central projection at r_0; the result is its centroid, or a point between that and r_0.
- * O(count²) at worst, O(count) as a rule. */
+ * O(count²) at worst, usually O(count). */
 ORB_MUST_CHECK orb_status orb_kernel_point(orb_context *ctx, orb_kernel_room *room, const double (*ring)[3],
                                            int32_t count, double out[3], int *found);
 

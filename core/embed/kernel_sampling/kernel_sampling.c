@@ -1,5 +1,7 @@
 /* The driver: simplify, base mesh, insertion, intermittent optimisation (Algorithm 1).
  *
+ * In: a mesh that orb_mesh_repair() accepted. Out: a unit vector for each vertex, not certified yet.
+ *
  * Reading order of the folder: kernel_sampling.h (what differs from the paper and why), this file, mesh (the
  * progressive mesh), simplify (section 4), sample (Eq. 2 and 3 in double precision), search (the same in floats, for
  * speed).
@@ -20,15 +22,15 @@
 #include "numeric/vec3.h"
 
 enum {
-  MAX_RELIEF = 8, /* times that the surroundings of a kernel too narrow for doubles are optimised, each time wider */
+  MAX_RELIEF = 8,     /* how often the surroundings of a kernel too narrow for doubles are optimised, wider each time */
   RELIEF_SWEEPS = 20, /* over these surroundings */
   LOOSEN_RINGS = 2,   /* around a new vertex in a dense region */
-  MAX_ATTEMPTS = 3,   /* of the whole, with growing effort; only meshes made to break the method need more than one */
-  POLE = 100          /* valence of one */
+  MAX_ATTEMPTS = 3,   /* of the whole, with growing effort; only meshes made to break the method need a second one */
+  POLE = 100          /* least valence of a pole */
 };
 
-/* The surroundings of a new vertex get so many sweeps if its ring has less than the share `tight` of the area that it
- * stands for. */
+/* If the ring of a new vertex has less than the share `tight` of the area that the vertex stands for, its surroundings
+ * get this many sweeps. */
 static const struct effort {
   double tight;
   int32_t sweeps;
@@ -43,7 +45,7 @@ typedef struct orb_ks_run {
   orb_ks_sampler sampler;
   orb_kernel_room kernel_room;
   double *x;                                        /* positions, total area 4π */
-  double *P;                                        /* the result: 3 a vertex */
+  double *P;                                        /* the result: 3 per vertex */
   double *displacement;                             /* of each active vertex in the current iteration */
   int32_t *active, *next, active_count, next_count; /* vertices of this iteration, and of the next one */
   int32_t *stamp, stamp_value;
@@ -156,8 +158,8 @@ static void enlist(orb_ks_run *run, int32_t v) {
   }
 }
 
-/* The rings around a new vertex do not grow across a pole, whose ring would be most of the mesh for each vertex at it.
- * The pole itself is left to the global optimisation, as its own ring costs most of all. */
+/* The rings around a new vertex do not grow across a pole: its ring would be most of the mesh for each vertex beside
+ * it. The pole itself is left to the global optimisation, because its own ring costs most. */
 static int is_pole(const orb_ks_run *run, int32_t v) {
   return run->m.valence[v] >= POLE;
 }
@@ -254,7 +256,7 @@ static orb_status place(orb_ks_run *run, int32_t v, int32_t parent, int *found) 
   return ORB_OK;
 }
 
-/* Enlists so many rings around the one vertex that is enlisted; poles among them are omitted unless `poles`. */
+/* Enlists this many rings around the one enlisted vertex; skips poles unless `poles` is set. */
 static void enlist_rings(orb_ks_run *run, int32_t rings, int poles) {
   for (int32_t r = 0; r < rings; r++) {
     for (int32_t i = 0, end = run->next_count; i < end; i++) {

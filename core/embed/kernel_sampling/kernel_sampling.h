@@ -38,7 +38,7 @@ typedef struct orb_ks_report {
   double kernel_points; /* how many samples of a placement lie in the kernel, on average */
   double iterations;    /* of an execution of Algorithm 1, on average */
   int32_t executions;   /* of Algorithm 1 */
-  int32_t clipped;      /* placements that no sample served */
+  int32_t clipped;      /* placements for which no sample was allowed */
   int32_t loosened;     /* placements into dense regions */
   int32_t relieved;     /* placements whose kernel had to be widened first */
   int32_t attempts;     /* 1, except for meshes made to break the method */
@@ -47,8 +47,8 @@ typedef struct orb_ks_report {
   void *trace_user;
 } orb_ks_report;
 
-/* Writes 3 doubles a vertex to points, not certified yet. Runs on one thread: the order of Algorithm 1 makes each step
- * depend on the one before (section 9.1). About O(n log n) times the samples. report may be NULL. */
+/* Writes 3 doubles per vertex to points, not certified yet. Runs on one thread: the order of Algorithm 1 makes each
+ * step depend on the one before (section 9.1). About O(n log n) times the samples. report may be NULL. */
 ORB_MUST_CHECK orb_status orb_kernel_sampling(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
                                               double *points, orb_ks_report *report);
 

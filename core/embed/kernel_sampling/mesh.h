@@ -33,7 +33,7 @@ static inline int32_t orb_ks_head(const orb_ks_mesh *m, int32_t h) {
   return m->tri[orb_next(h)];
 }
 
-/* x: scaled positions, 3 a vertex; borrowed. O(n). */
+/* x: scaled positions, 3 per vertex; borrowed. O(n). */
 ORB_MUST_CHECK orb_status orb_ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *x, orb_ks_mesh *out);
 void orb_ks_mesh_free(orb_context *ctx, orb_ks_mesh *m);
 

@@ -57,7 +57,7 @@ enum {
  * sampled, eight at least, so that a search takes a few milliseconds at most: returns n. */
 int32_t orb_ks_stride(const orb_ks_sampler *s, int32_t ring_count);
 
-/* Loads the ring of v. P: points on the sphere, 3 a vertex. */
+/* Loads the ring of v. P: points on the sphere, 3 per vertex. */
 ORB_MUST_CHECK orb_status orb_ks_ring_load(orb_context *ctx, orb_ks_sampler *s, const orb_ks_mesh *m, const double *P,
                                            int32_t v);
 

@@ -5,8 +5,8 @@
  *
  * The paper leaves a gap: 1/(1 + K) depends on scale, and as K falls to −1 and below it blows up and turns negative.
  * The mesh has area 4π here, so that K is 1 on average for a sphere, and for K < 0 the factor continues along its
- * tangent, 1 − K: smooth, positive, falling. A collapse keeps the link condition; a vertex for which none does waits
- * until its surroundings change.
+ * tangent, 1 − K: smooth, positive, falling. A collapse keeps the link condition; a vertex without such a collapse
+ * waits until its surroundings change.
  */
 #include "embed/kernel_sampling/simplify.h"
 
@@ -21,7 +21,7 @@
 
 static const double MAX_ASPECT = 1e12; /* of a degenerate triangle, so that sums stay finite */
 
-enum { POLE = 100 };                   /* valence above which a vertex is one */
+enum { POLE = 100 };                   /* a vertex of a higher valence is a pole */
 static const double POLE_COST = 1e300; /* above all others */
 
 typedef struct simplifier {
@@ -157,7 +157,7 @@ static double quadric_cost(const simplifier *s, int32_t h) {
   return fmax(error, 0) + 1e-6 * (4 * M_PI / s->m->vertex_count) * orb_distance2(at(s, v1), p);
 }
 
-/* Evaluating a pole would take O(valence²): it goes last, or when it is a pole no longer. */
+/* Evaluating a pole would take O(valence²), so it is collapsed last, or once it is no longer a pole. */
 static int is_pole(const simplifier *s, int32_t v) {
   return s->m->valence[v] > POLE;
 }

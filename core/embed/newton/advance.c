@@ -120,7 +120,7 @@ static double least_gain(const orb_refiner *r) {
 
 /* Sweeps a level that has just been reached: often if it is coarse, where sweeps are cheap and decide most. A sweep
  * that gains almost nothing ends the level; sweeps are added while each still gains much. Over-relaxed sweeps leave
- * neighbours on either side of their places, so the finest level ends with one that is not. */
+ * neighbours on either side of their places, so the last sweep of the finest level is not over-relaxed. */
 static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
   const orb_newton_settings *set = &r->settings;
   int32_t n = r->hierarchy->surface.vertex_count;

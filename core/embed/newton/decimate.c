@@ -27,7 +27,7 @@ enum {
   GRAIN = 1024,      /* vertices of a chunk */
   AHEAD = 12,        /* vertices between a prefetch and its use */
   SAMPLES = 2048,    /* of the costs, for the quantile */
-  SMALL = 1024,      /* up to so many live vertices the quantile is exact */
+  SMALL = 1024,      /* with at most this many live vertices the quantile is exact */
   SINGLE_BELOW = 60, /* with fewer live vertices a round is one collapse */
   CANCEL_EVERY = 8192,
   /* Rounds in a row without a collapse, after which … */
@@ -190,8 +190,8 @@ static uint32_t bits_of(float x) {
   return bits;
 }
 
-/* The value at index `at` of x, were x sorted. x is not negative, so its bits order as it does: they are sorted digit
- * by digit, and only within the digit that holds the value. Rearranges x. */
+/* Returns the value that would stand at index `at` if x were sorted. No x is negative, so their bits order as the
+ * values do. They are sorted digit by digit, and only within the digit that holds the value. Rearranges x. */
 static float select_float(float *x, int32_t count, int32_t at) {
   enum { DIGIT = 11, TOP = 32 };
   for (int shift = TOP - DIGIT; count > 1; shift = shift > DIGIT ? shift - DIGIT : 0) {
@@ -214,8 +214,8 @@ static float select_float(float *x, int32_t count, int32_t at) {
   return x[0];
 }
 
-/* The cost up to which this round collapses. Larger shares make fewer rounds but worse collapses; many vertices afford
- * them. */
+/* The cost up to which this round collapses. Larger shares make fewer rounds but worse collapses; levels with many
+ * vertices can afford them. */
 static float find_threshold(const decimation *d) {
   int32_t n = d->live_count, count = n <= SMALL ? n : SAMPLES;
   double share = n > 20000 ? 0.4 : n > 2000 ? 0.24 : n >= SINGLE_BELOW ? 0.05 : 0;

@@ -7,7 +7,7 @@
 
 typedef struct orb_hierarchy orb_hierarchy;
 
-/* Decimates to a tetrahedron with carried areas. keep (a flag a vertex of the mesh, or NULL): these vertices are not
+/* Decimates to a tetrahedron with carried areas. keep (a flag per vertex of the mesh, or NULL): these vertices are not
  * collapsed while more than keep_until vertices live. O(n log n). */
 ORB_MUST_CHECK orb_status orb_hierarchy_create(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep,
                                                int32_t keep_until, orb_hierarchy **out);

@@ -7,8 +7,8 @@
 enum {
   BINS = ORB_SWEEP_RING_MAX + 1, /* one for each valence */
   GRAIN = 128,                   /* batches of a chunk */
-  UNCOLOURED = -1,               /* colours that are none: */
-  SET_ASIDE = -2                 /* heavy */
+  UNCOLOURED = -1,               /* no colour yet */
+  SET_ASIDE = -2                 /* heavy: gets no colour */
 };
 
 typedef struct builder {

@@ -34,14 +34,14 @@ struct orb_hierarchy {
 struct orb_refiner {
   orb_hierarchy *hierarchy;
   orb_newton_settings settings;
-  double *point;                  /* 4 a vertex, the last unused */
+  double *point;                  /* 4 per vertex, the last unused */
   unsigned char *alive;           /* flags of vertices */
   unsigned char *pinned;          /* flags: these do not move */
   unsigned char *queued;          /* flags of the relaxation queue */
   int32_t *queue, queue_capacity; /* a power of two */
   float *crowding;                /* energy per area of each new star */
-  orb_star *star;                 /* one a thread */
-  orb_kernel_room *room;          /* one a thread */
+  orb_star *star;                 /* one per thread */
+  orb_kernel_room *room;          /* one per thread */
   int32_t star_count;
   int32_t live;
   int one_way;

@@ -4,7 +4,7 @@
 
 #include "orbmorph/embed.h"
 
-/* Fills points (3 a vertex of the mesh) and the timings of simplify and embed. The points are not certified yet. */
+/* Fills points (3 per vertex of the mesh) and the timings of simplify and embed. The points are not certified yet. */
 ORB_MUST_CHECK orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
                                          double *points, orb_embed_timings *timings);
 

@@ -26,9 +26,9 @@
 enum {
   GRAIN = 256,        /* vertices of a chunk */
   AHEAD = 8,          /* collapses between a prefetch and its use */
-  PLAIN_ABOVE = 1000, /* live vertices above which one well inside its kernel makes no step: the sweeps follow soon */
+  PLAIN_ABOVE = 1000, /* live vertices above which one well inside its kernel makes no step, as sweeps follow */
   RELAX_MOST = 400,   /* ring entries relaxed around one crowded vertex: about 60 stars, or one pole */
-  POLE = 100,         /* valence from which on only the sweeps move a vertex */
+  POLE = 100,         /* only the sweeps move a vertex of this valence or more */
   ATTEMPTS = 16       /* at a kernel that doubles have no room for */
 };
 
@@ -44,7 +44,7 @@ typedef struct round_job {
   atomic_int any_failed;
 } round_job;
 
-/* Sets p to the centroid of the ring; whether it lies well inside the kernel. */
+/* Sets p to the centroid of the ring. Returns whether it lies well inside the kernel. */
 static int centroid_inside(const orb_star *star, double p[3]) {
   p[0] = p[1] = p[2] = 0;
   for (int32_t i = 0; i < star->count; i++) {
@@ -175,7 +175,7 @@ static orb_status relieve(orb_context *ctx, orb_refiner *r, int32_t v, double bl
   return status;
 }
 
-/* Relaxes about `most` vertices outwards from v, in each of so many passes. */
+/* Relaxes about `most` vertices outwards from v, in each of `passes` passes. */
 static orb_status open_up(orb_context *ctx, orb_refiner *r, int32_t v, double blend, int32_t most, int passes) {
   orb_status status = ORB_OK;
   for (int pass = 0; pass < passes && status == ORB_OK; pass++) {

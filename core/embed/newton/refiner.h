@@ -13,7 +13,7 @@ typedef struct orb_refiner orb_refiner;
 ORB_MUST_CHECK orb_status orb_refiner_create(orb_context *ctx, orb_hierarchy *hierarchy,
                                              const orb_embed_options *options, orb_refiner **out);
 
-/* A refiner at full resolution with these points (3 a vertex, every triangle positive), and a hierarchy that holds no
+/* A refiner at full resolution with these points (3 per vertex, every triangle positive), and a hierarchy that holds no
  * collapses: for sweeps with pins. Destroy the refiner, then the hierarchy. O(n). */
 ORB_MUST_CHECK orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const double *points,
                                              const orb_embed_options *options, orb_hierarchy **hierarchy,
@@ -44,7 +44,7 @@ void orb_refiner_point(const orb_refiner *refiner, int32_t vertex, double out[3]
 void orb_refiner_move(orb_refiner *refiner, int32_t vertex, const double point[3]);
 void orb_refiner_pin(orb_refiner *refiner, int32_t vertex, int pinned);
 
-/* The points of all vertices (3 a vertex), once all live. */
+/* The points of all vertices (3 per vertex), once all live. */
 void orb_refiner_points(const orb_refiner *refiner, double *points);
 
 /* The energy that holds at the current level. */

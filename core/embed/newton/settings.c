@@ -1,9 +1,9 @@
 #include "embed/newton/settings.h"
 
-/* What an area counts beside the angles, where these are kept. Without unit. Of 0.1, 0.03, 0.01, 0.003 and 0.001, which
- * make limbs ever smaller, 0.003 led to the composed maps of least energy on eight pairs of posed people of the half
- * `choose` of tests/bench/correspond.py. The scale of the sphere then varies so much within the triangles of a
- * supermesh that places slide by more than 1 % of the diagonal, so it is a little more. */
+/* The weight of areas beside angles, for embeddings that keep angles. Dimensionless. Of 0.1, 0.03, 0.01, 0.003 and
+ * 0.001, which make limbs ever smaller, 0.003 led to the composed maps of least energy on eight pairs of posed people
+ * (the half `choose` of tests/bench/correspond.py). With 0.003 the scale of the sphere varies so much within the
+ * triangles of a supermesh that places slide by more than 1 % of the diagonal, so the value is a little larger. */
 static const double AREA_BESIDE_ANGLES = 0.005;
 
 void orb_newton_settings_of(const orb_embed_options *options, orb_newton_settings *out) {

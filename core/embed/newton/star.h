@@ -25,7 +25,7 @@ typedef struct orb_star {
 
 void orb_star_free(orb_context *ctx, orb_star *star);
 
-/* Loads the ring of v, from its vertex_corner on. point: 4 a vertex. */
+/* Loads the ring of v, from its vertex_corner on. point: 4 per vertex. */
 ORB_MUST_CHECK orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_corner_table *s, int32_t v,
                                         const double *point);
 

@@ -10,30 +10,32 @@ extern "C" {
 
 ORB_API void orb_align_defaults(orb_align_options *options);
 
-/* Aligns shape_count ≥ 1 shapes; the points of the first stay unless the method says otherwise. Every result is
- * certified.
+/* Aligns shape_count ≥ 1 shapes. The points of the first shape stay as they are unless the method says otherwise. Every
+ * result is certified.
  *
- * - rotate: rotations only. With landmarks, generalised Procrustes (Peng & Timalsena 2016, section 7.1) gives them;
- * without, a search over SO(3) finds the rotation under which the map between the shapes is nearest to a rigid motion.
- * Where landmarks leave the rotation around an axis open (one or two landmarks, or all on one axis), the search finds
- * it. The same holds in pin and rbf.
+ * - rotate: rotations only. With landmarks, generalised Procrustes (Peng & Timalsena 2016, section 7.1) gives them.
+ *   Without, a search over SO(3) finds the rotation under which the map between the shapes is nearest to a rigid
+ *   motion. If landmarks leave the rotation around an axis open (one or two landmarks, or all on one axis), the search
+ *   finds it. The same holds for pin and rbf.
  * - rbf: after the rotations, the warp of the paper (section 7.2), in rbf_steps steps a pass, to the spherical means;
  *   with one_way, to the first shape's points. The influence of a landmark ends at its radius. A step that folds is
- *   untangled locally. If that fails, the step is halved several times; if that fails too, the sphere is relaxed before
- *   it. Landmarks that still do not get past each other meet as in pin, where edges are split.
- * - pin: embeds the shapes again with the landmarks as constraints, which meet at their spherical means. Where
- * landmarks would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's
- * points or at new ones. After pin and rbf the vertices of a landmark have bit-equal points on all shapes.
+ *   untangled locally. If that fails, the step is halved several times. If that fails too, the sphere is relaxed before
+ *   the step. Landmarks that still cannot pass each other meet as in pin, where edges are split.
+ * - pin: embeds the shapes again with the landmarks as constraints, which meet at their spherical means. If landmarks
+ *   would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's points or at
+ *   new ones. After pin and rbf the vertices of a landmark have bit-equal points on all shapes.
  * - auto: pin if there are landmarks. Without landmarks, auto first searches for rotations, then matches each later
- * shape with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both shapes
- *   least. The composed map sends each vertex to where the match takes it. The preset fast only searches for rotations.
- *   `found` shows what was matched.
+ *   shape with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both
+ *   shapes least. The composed map sends each vertex to where the match takes it. The preset fast only searches for
+ *   rotations. `found` shows what was matched.
  *
  * Landmarks at the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * landmarks that are out of range or share a place on some shapes only. If the landmarks cannot all be met, it names
- * the first one that conflicts with those before it. ORB_E_BAD_OPTION: pin or rbf without landmarks. About O(n log n)
- * in triangles. Landmarks that lie at unrelated places of the shapes cost much more than landmarks that roughly
- * correspond; a set that needs more than about a minute of work is refused as one that cannot be met. */
+ * the first one that conflicts with those before it. ORB_E_BAD_OPTION: pin or rbf without landmarks.
+ *
+ * Takes about O(n log n) in triangles. Landmarks at unrelated places of the shapes cost much more than landmarks that
+ * roughly correspond. A set of landmarks that needs more than about a minute of work is refused as one that cannot be
+ * met. */
 ORB_API ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                             const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_align_options *options, orb_alignment *out);

@@ -24,18 +24,18 @@ typedef struct orb_landmark {
 } orb_landmark;
 
 typedef struct orb_align_options {
-  orb_align_method method;
-  orb_preset preset; /* fast: no composed map */
-  int32_t rbf_steps; /* steps of each pass; 10 */
-  int32_t one_way;   /* rbf: move only the later shapes (Peng & Timalsena 2016, Fig. 9) */
-  double rbf_radius; /* radius of landmarks that have none; 0: 1.0 */
+  orb_align_method method; /* default: ORB_ALIGN_PIN */
+  orb_preset preset;       /* fast: no composed map; default: ORB_PRESET_DEFAULT */
+  int32_t rbf_steps;       /* steps of each pass; default: 10 */
+  int32_t one_way;         /* rbf: move only the later shapes (Peng & Timalsena 2016, Fig. 9); default: 0 */
+  double rbf_radius;       /* radius of landmarks that have none; 0: 1.0 */
   double max_growth; /* pin: how many triangles splits may add to a mesh, as a multiple of its own number (of 2000 if it
                         has fewer), and at most 800000. Landmarks that need more are refused. 0: 64 */
 } orb_align_options;
 
 typedef struct orb_align_shape {
   const orb_mesh *mesh;
-  const double *points; /* its certified embedding, 3 a vertex */
+  const double *points; /* its certified embedding, 3 per vertex */
 } orb_align_shape;
 
 /* A shape after alignment. Its mesh is the same surface, perhaps with more vertices (landmarks within triangles or on
@@ -64,9 +64,9 @@ typedef struct orb_alternative {
 /* A match below this confidence is unsure. */
 #define ORB_MATCH_LIKELY 0.5
 
-/* What the search without landmarks knows of its best rough map; with several later shapes, each
- * member holds the worst value. If a rotation of the spheres already gives a good map, the alignment uses that rotation
- * and not the rough map. */
+/* What the search without landmarks knows of its best rough map; with several later shapes, each member holds the worst
+ * value. If a rotation of the spheres already gives a good map, the alignment uses that rotation and not the rough
+ * map. */
 typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
   double bend;         /* of the best rough map: 0 for a rigid motion */
@@ -78,10 +78,10 @@ typedef struct orb_match_facts {
                           (docs/bench-confidence.md) */
 } orb_match_facts;
 
-/* A given landmark that may be misplaced. When the optimiser no longer holds it, it moves far from its given place. */
+/* A given landmark that may be misplaced. When the optimiser releases it, it moves far from its given place. */
 typedef struct orb_suspect {
   int32_t landmark, shape; /* shape: the later one of the pair with the first shape */
-  double share;            /* of the pair's distortion: what lies nearer to this landmark than to the others */
+  double share;            /* of the pair's distortion: the part nearer to this landmark than to the others */
   orb_place at;            /* where it would lie, on the given mesh of `shape`, if its place on the first is right */
   double distance;         /* from its given place, relative to the shape's diagonal */
 } orb_suspect;

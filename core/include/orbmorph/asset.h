@@ -23,17 +23,18 @@ typedef enum orb_path { ORB_PATH_LINEAR = 0, ORB_PATH_RIGID } orb_path;
 /* A morph target besides the shapes. */
 typedef struct orb_asset_target {
   char name[ORB_NAME_MAX];
-  float *moves; /* 3 a supermesh vertex, from the first shape */
+  float *moves; /* 3 per supermesh vertex, from the first shape */
 } orb_asset_target;
 
 typedef struct orb_asset_options {
-  int normals; /* write normals; 1 */
-  orb_animation animation;
-  orb_fit fit; /* AUTO */
-  orb_path path;
-  int32_t path_steps; /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours, 3 */
-  int colors;         /* also write the colours of the later shapes, as morphed attributes; 0 */
-  orb_holes holes; /* REOPEN: omit the triangles that fill holes of the first shape, if the supermesh has their rims */
+  int normals;             /* write normals; default: 1 */
+  orb_animation animation; /* default: ORB_ANIMATION_PINGPONG */
+  orb_fit fit;             /* default: ORB_FIT_AUTO */
+  orb_path path;           /* default: ORB_PATH_LINEAR */
+  int32_t path_steps;      /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours; default: 3 */
+  int colors;              /* also write the colours of the later shapes, as morphed attributes; default: 0 */
+  orb_holes holes;         /* ORB_HOLES_REOPEN (default): omit the triangles that fill holes of the first shape, if the
+                              supermesh has their rims */
   /* split_count lists of a number for each corner of the supermesh: corners share a vertex of the file only if their
      numbers agree in every list. The lists that are NULL are skipped. */
   const int32_t *const *splits;
@@ -46,7 +47,7 @@ ORB_API void orb_asset_defaults(orb_asset_options *options);
 /* What was written. */
 typedef struct orb_asset_facts {
   int32_t vertex_count;       /* after splits for normals, seams and materials */
-  int32_t triangle_count;     /* without those that fill holes which are open again */
+  int32_t triangle_count;     /* without those that fill holes of the first shape that are open again */
   int32_t primitive_count;    /* one for each material that is used */
   int32_t target_count;       /* later shapes, then in-betweens, then those of the options */
   int32_t morphed_attributes; /* of all targets together; glTF requires clients to support only 8 at once */
@@ -87,9 +88,9 @@ typedef struct orb_fit_report {
   double up_degrees;           /* angle by which the y axis is rotated */
 } orb_fit_report;
 
-/* How orb_asset_write() moves each shape: 16 doubles a shape, column-major as in glTF, which take the shape's own
+/* How orb_asset_write() moves each shape: 16 doubles per shape, column-major as in glTF, which take the shape's own
  * coordinates to those of the asset. The identity for the first shape, and for all with ORB_FIT_NONE; else a rotation,
- * a translation and, with ORB_FIT_SIMILARITY, a uniform scale. reports: one a shape, or NULL. O(V·N). */
+ * a translation and, with ORB_FIT_SIMILARITY, a uniform scale. reports: one per shape, or NULL. O(V·N). */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh,
                                                        const orb_aligned_shape *shapes, orb_fit fit, double *out,
                                                        orb_fit_report *reports);

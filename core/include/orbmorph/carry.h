@@ -31,7 +31,7 @@ typedef struct orb_carry {
 
 /* The uploaded file of a shape. */
 typedef struct orb_shape_file {
-  const int32_t *corners;     /* the vertices of its triangles, 3 a triangle, in the numbers of the file */
+  const int32_t *corners;     /* the vertices of its triangles, 3 per triangle, in the numbers of the file */
   const unsigned char *bytes; /* glTF or GLB; NULL: another format */
   size_t size;
 } orb_shape_file;

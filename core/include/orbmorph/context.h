@@ -51,8 +51,8 @@ typedef struct orb_error {
   int32_t element_count;
   orb_error_element elements[ORB_ERROR_ITEMS];
   /* not-genus-zero: closed walks along edges of the file. Each handle has one, until the arrays are full; genus −
-   * loop_count handles have none. Loop i has
-   * the vertices loop_vertices[loop_start[i]] … loop_vertices[loop_start[i + 1] − 1], each once. */
+   * loop_count handles have none. Loop i has the vertices loop_vertices[loop_start[i]] … loop_vertices[loop_start[i +
+   * 1] − 1], each once. */
   int32_t loop_count, loop_start[ORB_ERROR_LOOPS + 1];
   double loop_length_relative[ORB_ERROR_LOOPS]; /* to the diagonal */
   int32_t loop_vertices[ORB_ERROR_LOOP_VERTICES];

@@ -17,7 +17,7 @@ typedef struct orb_certificate {
   double min_determinant;      /* the smallest det(p,q,r), rounded */
 } orb_certificate;
 
-/* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. A static filter decides
+/* Certifies points (3 per vertex, unit up to rounding) of a closed triangle list. A static filter decides
  * orientations; exact integers decide the rest. The degree is a signed count of the triangles that cover one direction
  * in general position. (The sum of solid angles / 4π is the same number, but only up to rounding.) Every triangle at
  * a point that is not finite counts as degenerate. The result is in out->valid; the call itself fails only if memory
@@ -44,7 +44,7 @@ typedef struct orb_distortion {
   double stretch_efficiency;       /* 1 / mean(½(σ₁⁻²+σ₂⁻²)) */
 } orb_distortion;
 
-/* Measures the map from positions to images, both 3 a vertex, over the same triangles. O(F). */
+/* Measures the map from positions to images, both 3 per vertex, over the same triangles. O(F). */
 ORB_API ORB_MUST_CHECK orb_status orb_distortion_measure(orb_context *ctx, const double *positions,
                                                          const double *images, const int32_t *triangles,
                                                          int32_t triangle_count, orb_distortion *out);
@@ -54,19 +54,19 @@ typedef enum orb_preset { ORB_PRESET_DEFAULT = 0, ORB_PRESET_FAST, ORB_PRESET_QU
 
 /* Options of both methods; start from orb_embed_defaults(). */
 typedef struct orb_embed_options {
-  orb_embed_method method;
+  orb_embed_method method; /* default: ORB_EMBED_NEWTON */
   /* newton */
-  orb_preset preset;
+  orb_preset preset;    /* default: ORB_PRESET_DEFAULT */
   double energy_weight; /* w of E = Σ D (w + a²/d²): 1 symmetric Dirichlet (default), 0 Praun & Hoppe's L2 stretch */
   /* kernel-sampling: Peng & Timalsena 2016, sections 4 to 6 */
-  double area_exponent;          /* ϱ of Eq. 3, 3.0 */
-  double aspect_exponent;        /* φ of Eq. 3, 12.0 */
-  double step;                   /* step of s and t in Eq. 2, 0.11 */
-  double displacement_threshold; /* of Algorithm 1, 1e-6 */
-  int32_t max_iterations;        /* of Algorithm 1 */
-  int32_t first_optimization;    /* vertices inserted before the first global optimisation, 25 */
-  double growth;                 /* factor of that number after each global optimisation, 1.25 */
-  int32_t qem_until;             /* simplify by QEM down to this many vertices, then by Eq. 1 (section 9.2) */
+  double area_exponent;          /* ϱ of Eq. 3; default: 3 */
+  double aspect_exponent;        /* φ of Eq. 3; default: 12 */
+  double step;                   /* step of s and t in Eq. 2; default: 0.11 */
+  double displacement_threshold; /* of Algorithm 1; default: 1e-6 */
+  int32_t max_iterations;        /* of Algorithm 1; default: 25 */
+  int32_t first_optimization;    /* vertices inserted before the first global optimisation; default: 25 */
+  double growth;                 /* factor of that number after each global optimisation; default: 1.25 */
+  int32_t qem_until; /* simplify by QEM down to this many vertices, then by Eq. 1 (section 9.2); default: 6000 */
 } orb_embed_options;
 ORB_API void orb_embed_defaults(orb_embed_options *options);
 
@@ -76,7 +76,7 @@ typedef struct orb_embed_timings {
 
 typedef struct orb_embedding {
   int32_t vertex_count;
-  double *points; /* 3 a vertex: |p| = 1 within 1e-12; what is certified */
+  double *points; /* 3 per vertex: |p| = 1 within 1e-12; what is certified */
   orb_certificate certificate;
   orb_distortion distortion;
   orb_embed_timings timings;

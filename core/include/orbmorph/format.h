@@ -37,7 +37,7 @@ ORB_API ORB_MUST_CHECK orb_status orb_mesh_read(orb_context *ctx, const unsigned
                                                 orb_format format, orb_mesh *out, orb_format *format_out);
 
 /* Appends the binary little-endian PLY of a mesh and its sphere: per vertex double x,y,z, double px,py,pz, int source;
- * per face uchar int list vertex_indices. points: 3 a vertex. */
+ * per face uchar int list vertex_indices. points: 3 per vertex. */
 ORB_API ORB_MUST_CHECK orb_status orb_sphere_ply_write(orb_context *ctx, const orb_mesh *mesh, const double *points,
                                                        orb_buffer *out);
 

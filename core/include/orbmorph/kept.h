@@ -9,7 +9,7 @@ extern "C" {
 #endif
 
 /* Writes an alignment of the given shapes. The bytes hold only what the shapes do not: points, added vertices and
- * changed triangles; about 24 bytes a vertex where the alignment added none. Equal alignments give equal bytes. The
+ * changed triangles; about 24 bytes per vertex where the alignment added none. Equal alignments give equal bytes. The
  * format has a version and this machine's byte order. */
 ORB_API ORB_MUST_CHECK orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes,
                                                       const orb_alignment *alignment, orb_buffer *out);

@@ -150,8 +150,8 @@ ORB_API void orb_merge_result_free(orb_context *ctx, orb_merge_result *result);
 
 /* Marks the triangles of the supermesh that are inverted on shape s: they face away from two directions, the mean of
  * the input's smooth normals at their corners, and the normal of its triangle at their centre on the sphere. positions:
- * 3 a supermesh vertex, on the shape. inverted: receives 1 or 0 for each triangle. The report of a merge has only their
- * number: call this function to show them, or for a supermesh of orb_remesh(). */
+ * 3 per supermesh vertex, on the shape. inverted: receives 1 or 0 for each triangle. The report of a merge has only
+ * their number: call this function to show them, or for a supermesh of orb_remesh(). */
 ORB_API ORB_MUST_CHECK orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh,
                                                     const orb_aligned_shape *shape, int32_t s, const double *positions,
                                                     unsigned char *inverted);

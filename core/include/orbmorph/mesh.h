@@ -54,8 +54,9 @@ typedef struct orb_document_parts {
 /* A mesh. The context owns all arrays; optional ones are NULL where the file has none. */
 typedef struct orb_mesh {
   int32_t vertex_count, triangle_count;
-  double *positions;  /* 3 a vertex, in units of the file (3MF: in millimetres): exactly the doubles that were parsed */
-  int32_t *triangles; /* 3 a triangle, counter-clockwise seen from outside */
+  double
+      *positions; /* 3 per vertex, in units of the file (3MF: in millimetres): exactly the doubles that were parsed */
+  int32_t *triangles; /* 3 per triangle, counter-clockwise seen from outside */
 
   /* The numbers of the file. Vertices: in OBJ, OFF and PLY file order; in STL 3·facet + corner; in glTF the POSITION
    * accessors of all triangle primitives one after another; in 3MF the meshes that the build shows, one after another.
@@ -66,9 +67,9 @@ typedef struct orb_mesh {
   int32_t *source_triangle;  /* of each triangle: its number in the file, or ORB_MADE_… */
 
   /* Attributes of corners (corner h belongs to vertex triangles[h]). */
-  float *normals;    /* 3 a corner, unit */
-  float *texcoords;  /* 2 a corner, glTF's convention (v down) */
-  float *colors;     /* 4 a corner, linear RGBA */
+  float *normals;    /* 3 per corner, unit */
+  float *texcoords;  /* 2 per corner, glTF's convention (v down) */
+  float *colors;     /* 4 per corner, linear RGBA */
   int32_t *material; /* of each triangle; NULL: all 0 */
   int32_t material_count, material_value_count, image_count, dropped_count;
   orb_material *materials;
@@ -106,7 +107,7 @@ typedef struct orb_topology {
   double genus; /* (2·components − V + E − F − loops) / 2, meaningful for orientable manifolds */
   int64_t boundary_loops, boundary_edges, nonmanifold_edges, nonmanifold_vertices;
   int consistent; /* neighbouring triangles face the same way */
-  int orientable; /* a consistent facing exists */
+  int orientable; /* a consistent orientation exists */
 } orb_topology;
 
 /* Measures any list of triangles, also one that does not form a surface. O(V + F) expected. */

@@ -28,20 +28,20 @@ enum { ORB_REMESH_HEEDS_TOLERANCE = 1, ORB_REMESH_HEEDS_MAX_TRIANGLES = 2 };
 ORB_API unsigned orb_remesh_heeds(orb_remesh_method method);
 
 typedef struct orb_remesh_options {
-  orb_remesh_method method; /* adaptive */
-  /* Largest position error, relative to each shape's diagonal; 0.001. A method that uses it stays within it, up to
-   * rounding (1e-12), unless max_triangles is too small for that. */
+  orb_remesh_method method; /* default: ORB_REMESH_ADAPTIVE */
+  /* Largest position error, relative to each shape's diagonal; default: 0.001. A method that uses it stays within it,
+   * up to rounding (1e-12), unless max_triangles is too small for that. */
   double tolerance;
-  int64_t max_triangles; /* 0: no limit. Takes precedence over the tolerance. */
-  int rims;              /* 1: the rims of the first shape's filled holes become edges, see has_rims; 0 */
+  int64_t max_triangles; /* takes precedence over the tolerance; 0 (default): no limit */
+  int rims;              /* 1: the rims of the first shape's filled holes become edges, see has_rims; default: 0 */
 } orb_remesh_options;
 ORB_API void orb_remesh_defaults(orb_remesh_options *options);
 
 /* Always closed, manifold, genus zero: T = 2V − 4, and no flipped triangle on the sphere. */
 typedef struct orb_supermesh {
   int32_t vertex_count, triangle_count, shape_count, landmark_count;
-  int32_t *triangles;         /* 3 a triangle, outward */
-  double *points;             /* 3 a vertex, unit */
+  int32_t *triangles;         /* 3 per triangle, outward */
+  double *points;             /* 3 per vertex, unit */
   orb_place *places;          /* shape major: places[s · vertex_count + v] on the mesh of aligned shape s */
   int32_t *landmark_vertices; /* landmark_count: the vertex of each landmark, −1 if the method keeps none */
   double *error_bound;        /* shape_count: proved bound on the distance, in the shape's units; NaN: none is proved */

@@ -45,7 +45,7 @@ typedef enum orb_status {
   ORB_E_NOT_FINITE,     /* NaN or infinite coordinate, or one too large */
   ORB_E_NOT_CLOSED,     /* boundary edges */
   ORB_E_NOT_MANIFOLD,   /* an edge with more than two faces, or a vertex with more than one fan */
-  ORB_E_NOT_ORIENTABLE, /* no consistent facing exists (or, without repairs, none is given) */
+  ORB_E_NOT_ORIENTABLE, /* no consistent orientation exists (or, without repairs, none is given) */
   ORB_E_NOT_CONNECTED,  /* several pieces */
   ORB_E_NOT_GENUS_ZERO, /* handles */
   ORB_E_DEGENERATE,     /* fewer than four triangles left, or a size or position that float32 cannot hold */

@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-/* The positions of `count` places of the shape: 3 a place. */
+/* The positions of `count` places of the shape: 3 per place. */
 ORB_API ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
                                                          const orb_place *places, int32_t count, double *out);
 
@@ -17,7 +17,7 @@ ORB_API void orb_place_before(const orb_mesh *mesh, const orb_aligned_shape *sha
                               orb_place *out);
 
 /* Converts a place on a repaired mesh to one in its file; triangle −1 if the file has no such triangle. corners: the
- * vertices of the triangles of the file, 3 a triangle, in the numbers of the file. */
+ * vertices of the triangles of the file, 3 per triangle, in the numbers of the file. */
 ORB_API void orb_place_in_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out);
 
 /* How well shape s is reproduced; lengths in its own units. Samples are face centres, edge midpoints and vertices.

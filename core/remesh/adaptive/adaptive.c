@@ -1,11 +1,11 @@
 /* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (placed/bound.h).
  *
  * The start is optimistic: each shape alone is thinned out by a quadric (thin.h), and the net holds the vertices that
- * are left. Then it proves: edges that deviate are flipped or split until the bound holds. Where that does not end, or
- * leaves many inverted triangles, the method starts from the overlay of all shapes instead, which is exact. Where the
- * map is twisted so much that the overlay is huge, the method starts from the overlay of reduced shapes (start.h), and
- * only collapses and flips edges: such a supermesh needs many times the triangles of the shapes in any case, and the
- * other steps would take minutes to save a few per cent.
+ * are left. Then the method proves: it flips or splits edges that deviate until the bound holds. If that does not end,
+ * or leaves many inverted triangles, the method starts from the overlay of all shapes instead, which is exact. If the
+ * map is so twisted that the overlay is huge, the method starts from the overlay of reduced shapes (start.h), and only
+ * collapses and flips edges: such a supermesh needs many times the triangles of the shapes in any case, and the other
+ * steps would take minutes to save a few per cent.
  *
  * From then on no step leaves the tolerance, and none leaves more inverted triangles than it found. The first round
  * collapses and flips edges and repairs the inverted triangles of the start. If too many remain, it is repeated from
@@ -31,32 +31,33 @@
 #include "remesh/placed/form.h"
 #include "remesh/placed/refine.h"
 
-enum { REFINEMENTS_MOST = 32 }; /* after so many the net counts as one that refinement cannot finish */
-/* More inverted triangles than one in FEW after the first round are worth a local overlay; if more than one in SOME
- * remain after it, or there was more than one in MANY, the overlay of everything is. Larger numbers spend more time on
- * fewer inverted triangles. */
+enum { REFINEMENTS_MOST = 32 }; /* after this many, refinement counts as unable to finish the net */
+/* If more than one triangle in FEW is inverted after the first round, a local overlay is worth its time. If more than
+ * one in SOME remain after that, or more than one in MANY were inverted, the overlay of everything is. Larger numbers
+ * spend more time on fewer inverted triangles. */
 enum { FEW = 3000, SOME = 1000, MANY = 100 };
-/* More inverted triangles than one in TWISTED of the refined net: the overlay of everything is worth it at once. */
+/* If the refined net has more inverted triangles than one in TWISTED, the overlay of everything is worth it at once. */
 enum { TWISTED = 7 };
-/* Shapes times triangles up to which a second start, from the overlay, is affordable. */
+/* A second start, from the overlay, is affordable up to this many shapes times triangles. */
 enum { OVERLAY_MOST = 120000 };
-/* The same from which merges are tried less. */
+/* Merges are tried less from this many shapes times triangles on. */
 enum { QUICK_FROM = 120000 };
-/* The overlay is huge, and the map is twisted, if it has more than HUGE_OVERLAY triangles and more than HUGE_GROWTH
- * times those of all shapes for each shape after the first. Well aligned shapes have four or five times theirs for
- * each. */
+/* The overlay is huge, and the map is twisted, if the overlay has more than HUGE_OVERLAY triangles and, for each shape
+ * after the first, more than HUGE_GROWTH times the triangles of all shapes. Well aligned shapes have four or five times
+ * as many for each. */
 enum { HUGE_OVERLAY = 600000, HUGE_GROWTH = 12 };
-/* Of the tolerance: guessed deviation up to which each shape is thinned out alone. Above the tolerance, because the
- * guess is a mean and splits bring back what is needed: from 0.5 to 1.5 the result has the same size, and the start
- * takes the less time. */
+/* The guessed deviation up to which each shape is thinned out alone, as a share of the tolerance. It is above 1,
+ * because the guess is a mean and splits bring back what is needed: from 0.5 to 1.5 the result has the same size, and
+ * the start takes the less time. */
 static const double THIN = 1.2;
-/* The same for the overlay. Less, because it is there for the sake of inverted triangles, which thinning can make. */
+/* The same for the overlay. Less, because the overlay is for the sake of inverted triangles, and thinning can make
+ * some. */
 static const double THIN_OVERLAY = 0.5;
-/* Relative to the diagonal: from this tolerance on, fewer triangles matter more than inverted ones and slivers. */
+/* From this tolerance on, relative to the diagonal, fewer triangles matter more than inverted ones and slivers. */
 static const double STRICT_MOST = 0.05;
-/* Relative to the diagonal: no distance on a shape exceeds 1, so more tolerance would not help. */
+/* The largest tolerance, relative to the diagonal: no distance on a shape exceeds 1, so more would not help. */
 static const double TOLERANCE_MOST = 4;
-/* From step to step of the tolerance: smaller steps take longer and end nearer to the least tolerance. */
+/* The factor from step to step of the tolerance: smaller steps take longer and end nearer to the least tolerance. */
 static const double RAISE = 1.25;
 
 /* Collapses first, then repairs inverted triangles, while enough vertices are left for that. */
@@ -145,8 +146,8 @@ static int expects_many_inverted(orb_context *ctx, const orb_remesh_job *job, or
   return may_overlay(job) && orb_placed_count_inverted(ctx, placed) * TWISTED > orb_placed_live(placed);
 }
 
-/* Where the first round leaves too many triangles inverted, repeats it from the overlay around them; or, unless it is
- * too large, from the whole overlay, if they are very many or the local overlay has not helped. */
+/* If the first round leaves too many triangles inverted, repeats it from the overlay around them. If they are very
+ * many, or the local overlay has not helped, repeats it from the whole overlay, unless that is too large. */
 static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed, double tolerance,
                                   int is_overlay) {
   int64_t inverted = orb_placed_count_inverted(ctx, placed), live = orb_placed_live(placed);
@@ -178,8 +179,9 @@ static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, o
   return status == ORB_OK ? begin(ctx, placed, tolerance * tolerance) : status;
 }
 
-/* For a map that is twisted: all steps, to a net within the tolerance. */
-static orb_status remesh_wound(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_placed_net *placed) {
+/* For a twisted map: all steps, to a net within the tolerance. */
+static orb_status remesh_twisted(orb_context *ctx, const orb_remesh_job *job, double tolerance,
+                                 orb_placed_net *placed) {
   double limit2 = tolerance * tolerance;
   ORB_TRY(orb_adaptive_start_from_reduced(ctx, job, limit2, placed));
   orb_progress(ctx, "remesh", 0.3);
@@ -229,7 +231,7 @@ static orb_status remesh_within(orb_context *ctx, const orb_remesh_job *job, dou
     ORB_TRY(orb_adaptive_overlay_size(ctx, job, &overlay));
   }
   if (overlay > HUGE_OVERLAY && overlay > HUGE_GROWTH * others * triangles_of(job)) {
-    orb_status status = remesh_wound(ctx, job, tolerance, placed);
+    orb_status status = remesh_twisted(ctx, job, tolerance, placed);
     if (status != ORB_E_NOT_CERTIFIED) {
       return status;
     }

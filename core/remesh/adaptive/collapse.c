@@ -30,8 +30,8 @@
 enum { RING_MAX = 48 };    /* vertices with more neighbours stay; the size of arrays on the stack */
 enum { VALENCE_MAX = 14 }; /* a collapse must not give a vertex more neighbours than this, or than it has */
 enum { TRIES = 4 };        /* targets tried for a vertex, the cheapest first; more find a few more collapses */
-/* A batch holds at most BATCH_MOST vertices and one in BATCH_PART of the heap: larger batches keep more threads busy
- * and depart farther from the order of cost. A thread takes BATCH_GRAIN at a time. */
+/* A batch holds at most BATCH_MOST vertices, and at most one in BATCH_PART of the heap: larger batches keep more
+ * threads busy but depart farther from the order of cost. A thread takes BATCH_GRAIN at a time. */
 enum { BATCH_MOST = 256, BATCH_PART = 32, BATCH_GRAIN = 4 };
 enum { GRAIN = 512 }; /* vertices a thread takes at a time when all get their quadrics and costs */
 /* Weight of the squared distance in the cost, in units of the squared limit: small against any quadric, but enough that
@@ -53,7 +53,7 @@ typedef struct collapser {
   orb_placed_net *placed;
   double limit2;
   int strict, thorough;
-  orb_quadric *quadric; /* per net vertex, one a shape */
+  orb_quadric *quadric; /* per net vertex, one per shape */
   orb_heap heap;        /* vertices by the cost of their best target */
   int32_t *target;      /* per vertex: its best target */
   int64_t live;
@@ -255,7 +255,7 @@ static int next_target(const double *cost, int n) {
   return best;
 }
 
-/* Covers what decides whether u can be removed; the last bit says that the search was thorough. */
+/* A mark of what decides whether u can be removed; the last bit says that the search was thorough. */
 static uint64_t mark_of(const collapser *c, int32_t u) {
   uint64_t mark = orb_mark_mix(4 + (uint64_t)c->strict, &c->limit2, sizeof c->limit2);
   uint64_t sum = orb_mark_of_surroundings(&c->placed->net, u);

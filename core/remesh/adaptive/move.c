@@ -22,7 +22,7 @@
 enum { RING_MAX = 16, SHAPES_MAX = 16 };
 enum { COLOURS = 64 };    /* the bits of a word; a vertex that finds no colour free stays */
 enum { MOVE_GRAIN = 16 }; /* vertices a thread takes at a time */
-/* Of the cost: lower makes many moves that gain little and make no room for collapses. */
+/* Of the cost: lower values make many moves that gain little and make no room for collapses. */
 static const double LEAST_GAIN = 0.01;
 /* A moved triangle is at least 1 / FLATNESS times as high as its longest side on the sphere: flatter ones block later
  * steps. */
@@ -223,7 +223,7 @@ static void reassign_items(const star *s) {
   }
 }
 
-/* Covers all that a search for a move depends on: the points of the vertex and its neighbours, and the limit. */
+/* A mark of all that a search for a move depends on: the points of the vertex and its neighbours, and the limit. */
 static uint64_t mark_of(const star *s) {
   const orb_net *net = &s->placed->net;
   uint64_t mark = orb_mark_mix(1, &s->limit2, sizeof s->limit2);

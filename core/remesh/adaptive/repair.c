@@ -138,7 +138,7 @@ static int try_way(const repairer *m, int32_t t, int way) {
   return try_star(m, &t, 1, &list, 0);
 }
 
-/* Covers what the ways of a triangle depend on, except what lies beyond its corners' neighbours' neighbours. */
+/* A mark of what the ways of a triangle depend on, except what lies beyond its corners' neighbours' neighbours. */
 static uint64_t mark_of(const repairer *m, int32_t t) {
   uint64_t mark = orb_mark_mix(1, &m->limit2, sizeof m->limit2), sum = (uint64_t)m->goal;
   for (int k = 0; k < 3; k++) {

@@ -1,6 +1,6 @@
 /* Thins out a net before anything is proved: half-edge collapses that are accepted by a quadric alone (Garland &
- * Heckbert 1997). What a shape has more of than the tolerance needs would otherwise be carried through the start, which
- * splits and flips edges between all vertices of all shapes, and be removed by collapses that are each proved.
+ * Heckbert 1997). Without it, vertices that the tolerance does not need would be carried through the start, which
+ * splits and flips edges between all vertices of all shapes, and then removed by collapses that are each proved.
  *
  * Vertices are visited in order of their numbers, in sweeps with a rising threshold: nearly the order of cost, without
  * a heap. A vertex moves onto the neighbour that lies nearest to the planes of both on all shapes. The guess of the
@@ -20,15 +20,15 @@
 enum { RING_MAX = 14 }; /* vertices with more neighbours stay, and no collapse makes one */
 /* Thresholds of the sweeps, in units of the squared limit: more sweeps come nearer to the order of cost. */
 static const double SWEEP[] = {0.01, 0.1, 0.4, 1, 1, 1};
-/* A triangle may get thinner until its quality is LEAST_QUALITY, and tilt until its facing is LEAST_FACING (form.h says
- * what they are): lower values leave needles and inverted triangles to the start, higher ones more triangles. */
+/* A triangle may get thinner until its quality is LEAST_QUALITY, and tilt until its facing is LEAST_FACING (form.h
+ * defines both): lower values leave needles and inverted triangles to the start, higher ones more triangles. */
 static const double LEAST_QUALITY = 0.02, LEAST_FACING = 0.2;
 
 typedef struct thinner {
   orb_net *net;
   int32_t shapes;
   double *const *position, *const *normal; /* per shape, 3 a net vertex */
-  orb_quadric *quadric;                    /* per net vertex, one a shape */
+  orb_quadric *quadric;                    /* per net vertex, one per shape */
   const unsigned char *fixed;              /* per net vertex: it stays */
   double *least; /* per net vertex: no target that is allowed costs less, until its ring changes */
 } thinner;

@@ -27,7 +27,7 @@ typedef struct orb_overlay {
   int32_t *lone; /* vertices of layer 1 that coincide with none of layer 0, in ascending order */
   int32_t lone_count;
   int32_t *cross;    /* per crossing: its edges in layer 0 and in layer 1 */
-  double *points;    /* 3 a vertex; those of crossings are rounded */
+  double *points;    /* 3 per vertex; those of crossings are rounded */
   orb_place *places; /* layer major: places[l · vertex_count + v] */
   int32_t *triangles, *parent;
   int32_t *merged; /* pairs (gone, kept) of vertices that the repair merged; the gone ones have no triangles */

@@ -20,14 +20,14 @@
 /* Every triangle lies in one triangle of each shape, so only places and their positions are rounded: by a few units in
  * the last place of the largest coordinate, for each shape of the overlay. */
 static const double PLACE_ROUNDING = 64 * 2.3e-16;
-/* Of the diagonal: what rounding adds when a caller measures the distance. */
+/* Relative to the diagonal: what rounding adds when a caller measures the distance. */
 static const double DISTANCE_ROUNDING = 1e-13;
 
 /* The overlay of the first shapes: one triangulation, with places and parents on each of them. */
 typedef struct partial {
   int32_t vertex_count, triangle_count, shapes;
   double *points;
-  int32_t *triangles, *parent; /* parent: per triangle, one a shape */
+  int32_t *triangles, *parent; /* parent: per triangle, one per shape */
   orb_place **places;          /* per shape */
   double *moved;               /* per shape: how far the repair of rounding may have moved it */
 } partial;

@@ -14,8 +14,8 @@
 
 enum { ROUNDS = 80 }; /* in the second half, input vertices may move too */
 enum { STEPS = 46 };  /* halvings of the way to the middle: down to 2⁻⁴⁵, about the rounding of a double */
-/* Every so many rounds all triangles are tested, because moves may flip others; every so many, the neighbours of
- * flipped triangles move too. Smaller numbers cost more time. */
+/* Every ALL_EVERY rounds all triangles are tested, because moves may flip others. Every WIDE_EVERY rounds the
+ * neighbours of flipped triangles move too. Smaller numbers cost more time. */
 enum { ALL_EVERY = 20, WIDE_EVERY = 4 };
 
 /* Height that stands for one that rounding gave the wrong sign: below every one that is computed right. */

@@ -81,7 +81,7 @@ enum { GRAIN = 512 }; /* triangles a thread takes at a time */
 
 typedef struct bound_loop {
   const orb_placed_net *placed;
-  double *greatest; /* per chunk of GRAIN triangles, one a shape */
+  double *greatest; /* per chunk of GRAIN triangles, one per shape */
 } bound_loop;
 
 static void bound_range(void *arg, int64_t begin, int64_t end, int thread) {

@@ -141,7 +141,7 @@ typedef struct inverted_loop {
   atomic_llong count;
 } inverted_loop;
 
-/* Covers all that the question depends on: the points of the corners. */
+/* A mark of all that the answer depends on: the points of the corners. */
 static uint64_t mark_of(const orb_net *net, const int32_t *corner) {
   uint64_t mark = orb_mark_of_point(orb_net_point(net, corner[0])) +
                   3 * orb_mark_of_point(orb_net_point(net, corner[1])) +

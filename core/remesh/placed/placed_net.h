@@ -19,9 +19,9 @@ typedef struct orb_placed_net {
   orb_pack *pack;                /* per shape: the same and its positions, for tracing */
   double **position;             /* per shape: its vertices, divided by its diagonal */
   double **vertex_normal;        /* per shape: smooth unit normals of its vertices */
-  double *at;                    /* per net vertex, 3 a shape: its position, divided by the shape's diagonal */
-  double *normal;                /* per net vertex, 3 a shape: the shape's smooth normal there, unit */
-  orb_spot *spot;                /* per net vertex, one a shape: where it lies */
+  double *at;                    /* per net vertex, 3 per shape: its position, divided by the shape's diagonal */
+  double *normal;                /* per net vertex, 3 per shape: the shape's smooth normal there, unit */
+  orb_spot *spot;                /* per net vertex, one per shape: where it lies */
   unsigned char *fixed;          /* per net vertex: it is a landmark and must stay */
   uint64_t *no_move;             /* per net vertex: mark of the star in which no better point was found */
   uint64_t *no_collapse;         /* per net vertex: mark of the surroundings in which it could not be removed */

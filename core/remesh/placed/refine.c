@@ -20,9 +20,10 @@ static const double NEEDLE = 1e-3;
 /* Splits keep this share of the edge's length from its ends: closer ones would leave short edges, farther ones would
  * miss the deviation. */
 static const double MARGIN = 0.1;
-/* Needles that a split follows at most, so that it ends where they lie in a ring. */
+/* The most needles that a split follows, so that it ends where they lie in a ring. */
 enum { LONGER_MOST = 64 };
-/* Edges of the queue whose deviations are found at once: more keep the threads busy, fewer are found in vain. */
+/* Edges of the queue whose deviations are computed at once: more keep the threads busy, but more are computed in vain.
+ */
 enum { AHEAD = 1024 };
 /* Refinement gives up after examining each edge of the start, or of a net of all vertices, four times, and this many
  * more, which lets tiny nets grow. */

@@ -12,16 +12,16 @@
 #include "remesh/placed/export.h"
 #include "remesh/placed/placed_net.h"
 
-/* A vertex so near to where a rim crosses one of its edges, as a share of the edge, moves there: a new one beside it
- * would make slivers. */
+/* If a vertex lies this near to the point where a rim crosses one of its edges, as a share of the edge, it moves there:
+ * a new vertex beside it would make slivers. */
 static const double NEAR = 0.05;
 /* A vertex this near to a rim, on the unit sphere, lies on it: rounding of its point explains the distance. */
 static const double ON = 1e-12;
 
-enum { ROUNDS = 24 }; /* of splits; each halves the edges that deviate, so that few rounds do */
+enum { ROUNDS = 24 }; /* of splits; each halves the edges that deviate, so a few rounds suffice */
 
-/* A vertex this near to the opposite edge of a triangle makes a needle of it, across which nothing can be traced: the
- * edge is flipped. */
+/* A vertex this near to the opposite edge of its triangle makes a needle, across which nothing can be traced. The edge
+ * is flipped. */
 static const double FLAT = 1e-7;
 
 typedef struct rims {

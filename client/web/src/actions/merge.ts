@@ -118,7 +118,7 @@ function foundIn({ landmarks = [], request }: Supermesh): { name?: string; at: P
     : [];
 }
 
-/** Finds out what the other matches do otherwise than the best one. */
+/** Finds out how the other matches differ from the best one. */
 async function tellOthers({ matches }: Result) {
   if (!matches || matches.told || !isOfPage(matches.best)) return;
   const { alternatives = [] } = matches.best;
@@ -394,7 +394,7 @@ export async function measureErrors() {
   }
 }
 
-/** From here on a map is bad: reports warn of more than 1 % of the area at such an energy. */
+/** From this energy on a map is bad: reports warn of more than 1 % of the area at such an energy. */
 export const STRETCHED = 20;
 
 /** Measures how much the morph stretches its surface, and paints it on each shape. */

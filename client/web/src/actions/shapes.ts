@@ -201,7 +201,10 @@ const CLOSE = 'close_handles';
 /** The daemon's own limit of a handle that it closes, and the largest limit that it takes: relative to the diagonal. */
 const SMALL = 0.05;
 const LARGEST = 10;
-/** A refusal with tens of thousands of handles may leave loops out, and a cut can lengthen others: each round allows the longest of those left. */
+/**
+ * The rounds that closeTheRest() makes. A refusal with tens of thousands of handles may leave loops out, and a cut can
+ * lengthen others: each round allows the longest of those left.
+ */
 const ROUNDS = 8;
 
 /** Closes the handles that are left after a repair with this `size`. */
@@ -230,7 +233,7 @@ function otherParts(parts: unknown): { repair: string; label: string }[] {
   });
 }
 
-/** One button closes all handles, those too that are not among the loops on show. */
+/** One button closes all handles, including those whose loops are not on show. */
 function handleRepairs(lengths: number[], genus: number): { repair: string; label: string }[] {
   const size = sizeFor(lengths);
   if (size === 0 || size > LARGEST) return [];

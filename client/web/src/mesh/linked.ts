@@ -32,7 +32,10 @@ const sides = (p: Float32Array, [a, b, c]: number[]) => ({
   v: [p[c] - p[a], p[c + 1] - p[a + 1], p[c + 2] - p[a + 2]],
 });
 
-/** The first triangle that a ray meets from outside (Möller and Trumbore). Each ray sees another surface: no tree pays. */
+/**
+ * The first triangle that a ray meets from outside (Möller and Trumbore). Each ray meets another surface, so a tree does
+ * not pay.
+ */
 function firstHit(p: Float32Array, index: Uint32Array, origin: number[], direction: number[]) {
   let best: { corners: number[]; weights: number[] } | null = null;
   let least = Infinity;

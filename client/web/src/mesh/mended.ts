@@ -23,7 +23,7 @@ export function mendedMesh(repaired: RawMesh, file: RawMesh | undefined): { raw:
   return { raw, added };
 }
 
-/** Gives each triangle that the file has the file's corners, and with them their look. The others are plain. */
+/** Gives each triangle of the file the file's corners, and with them their look. Other triangles are plain. */
 function wear(raw: RawMesh, file: RawMesh, dress: Dress) {
   const find = trianglesOf(file);
   const { corners, positions } = raw;

@@ -13,7 +13,7 @@ export interface Packed {
   filter?: string;
 }
 
-const MOST = 64; // no stream holds more bytes for each of its own: two bits stand for sixteen
+const MOST = 64; // a stream grows by this factor at most: two bits stand for sixteen bytes
 const damaged = () => new Error('The compressed data of the file is damaged.');
 const signed = (value: number) => (value & 1 ? ~(value >>> 1) : value >>> 1);
 
@@ -161,7 +161,7 @@ function exponential(bytes: Uint8Array) {
 
 const HEADS = { ATTRIBUTES: 0xa0, TRIANGLES: 0xe1, INDICES: 0xd1 };
 
-/** What the view holds. Normals and rotations, which have filters of their own, are not read by the studio. */
+/** What the view holds. The studio does not read normals and rotations, which have filters of their own. */
 export function unpackView(
   { count, byteStride: stride, mode, filter = 'NONE' }: Packed,
   bytes: Uint8Array,

@@ -65,7 +65,7 @@ interface Drawn extends Part {
 }
 
 /**
- * What morphs: the mesh of an asset, or in an uploaded document that has got targets those meshes that have. The rest of
+ * What morphs: the mesh of an asset, or those meshes of an uploaded document to which targets were added. The rest of
  * such a document follows, such as eyes and clothes, wherever its scene shows them.
  */
 function drawnParts(gltf: Gltf): { moving: (Drawn & { first: number })[]; still: Drawn[] } {

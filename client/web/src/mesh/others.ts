@@ -1,4 +1,4 @@
-/** What another match of the shapes does otherwise, told by the landmarks that the shown match has found. */
+/** How another match of the shapes differs, told by the landmarks that the shown match has found. */
 
 type Point = ArrayLike<number>;
 

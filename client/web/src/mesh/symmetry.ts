@@ -14,9 +14,9 @@ export interface Plane {
 
 const SAMPLES = 400;
 const ROUNDS = 12;
-/** A plane counts if mirrored points are that near the surface: root mean square, in half diagonals of the box. */
+/** A plane counts if mirrored points are this near the surface: root mean square, in half diagonals of the box. */
 const GOOD = 0.012;
-/** Another plane, rotated by more than 15°, has to be that much worse. A ball or a box has many good planes. */
+/** Another plane, rotated by more than 15°, must be worse by this factor. A ball or a box has many good planes. */
 const CLEARLY = 4;
 const SAME = Math.cos((15 * Math.PI) / 180);
 

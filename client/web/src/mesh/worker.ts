@@ -31,7 +31,7 @@ interface Held {
 }
 
 const held = new Map<string, Held>();
-/** What morphs; drawn: how many vertices the page draws, which has more. */
+/** What morphs. `drawn`: the number of vertices that the page draws, which is larger. */
 const morphs = new Map<string, MorphData & { drawn: number }>();
 const spheres = new Map<string, { surface: Float32Array; index: Uint32Array; place: Float32Array; bvh?: Bvh }>();
 
@@ -260,8 +260,8 @@ const ops = {
   },
 
   /**
-   * What other matches do otherwise than the shown one. found: its landmarks, with their places on all shapes; others:
-   * which shape each of the other matches takes otherwise, and its places.
+   * How other matches differ from the shown one. found: its landmarks, with their places on all shapes; others: the shape
+   * that each other match matches differently, and its places.
    */
   others(
     keys: string[],

@@ -112,8 +112,9 @@ function matricesOf({ nodes = [], scenes, scene = 0 }) {
 }
 
 /**
- * The primitives that morph, with those targets that are shapes: an uploaded document that has got targets may have
- * others first. Its other meshes follow, which stay as they are. variant: of the materials; extras: other targets, with weights that stay.
+ * The primitives that morph, with those targets that are shapes: an uploaded document to which targets were added may
+ * have others first. Its other meshes follow, which stay as they are. variant: of the materials; extras: other targets,
+ * with weights that stay.
  */
 function meshOf({ json, read }, variant, extras) {
   const kept = json.meshes.filter((mesh) => mesh.extras?.firstShape !== undefined);
@@ -178,7 +179,7 @@ function toScene(m, read) {
     mirrored,
     places: (index) => place(read(index)),
     ways: (index) => way(read(index)),
-    /** with the turn that a target adds */
+    /** with the change that a target adds */
     normals: (index, turn) => {
       const values = read(index);
       const more = turn === undefined ? null : read(turn);

@@ -99,13 +99,13 @@ class Buffers {
     this.dye = skin?.dye ? new BufferAttribute(skin.dye, 3) : null;
   }
 
-  /** One more model draws them. */
+  /** Counts one more model that draws them. */
   take(): this {
     this.models++;
     return this;
   }
 
-  /** One model less draws them. The last one frees the textures and their images. */
+  /** Counts one model less. The last one frees the textures and their images. */
   drop() {
     if (--this.models > 0) return;
     for (const { map } of this.clads) map?.dispose();

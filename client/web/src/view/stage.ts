@@ -26,7 +26,7 @@ export class View {
   /** the place under the mouse; null once it leaves the view */
   onHover: ((ray: Ray | null) => void) | null = null;
   own = new Orbit();
-  /** a camera of its own, which no one rotates */
+  /** a camera of its own, which the user cannot rotate */
   fixed: Look | null = null;
 
   constructor(

@@ -1,4 +1,4 @@
-/* What a caller knows of the map that it wants. */
+/* What a caller knows of the map it wants. */
 #ifndef ORB_ALIGN_MAP_ENGINE_GUIDE_H
 #define ORB_ALIGN_MAP_ENGINE_GUIDE_H
 
@@ -11,7 +11,7 @@ typedef enum orb_map_from {
   ORB_MAP_FROM_SPACE, /* what fits best in space */
   ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
   ORB_MAP_FROM_WALK,  /* none: a landmark walk alone, which is quick. Needs `both` */
-  ORB_MAP_FROM_PINS,  /* none: the map as given is only let go where it was pinned. For springs */
+  ORB_MAP_FROM_PINS,  /* none: the map as given is only released where it was pinned. For springs */
   ORB_MAP_FROM_COPY   /* none: a decimated copy of the moving shape has its map already. The map as given is not used */
 } orb_map_from;
 
@@ -30,15 +30,15 @@ typedef struct orb_map_level_map {
   orb_hierarchy **hierarchy; /* of the moving shape; one level of it has these vertices. It is taken over */
 } orb_map_level_map;
 
-/* What a run towards a target has led to. A bulk is the energy of a map in which one triangle counts little
+/* What a run towards a target has led to. A bulk is the energy of a map with a low cap on each triangle
  * (params.energy.bulk). */
 typedef struct orb_map_course {
   double first_bulk, bulk; /* after the first start, and at last */
   int is_walked;           /* the first start is a landmark walk */
-  int is_beaten;           /* it does not beat what it has to, and is the last */
+  int is_beaten;           /* the first start does not beat what it must beat, and is the last */
 } orb_map_course;
 
-/* What a first start has to beat; else it is the last. 0: nothing. */
+/* What a first start must beat; otherwise it is the last. 0: nothing. */
 typedef struct orb_map_beat {
   double bulk;   /* of a start from targets */
   double energy; /* of a walk */
@@ -47,7 +47,7 @@ typedef struct orb_map_beat {
 /* What guides a composed map. */
 typedef struct orb_map_guide {
   orb_map_from from;
-  const double *target; /* NULL, or where each vertex of `moving` lies on the fixed shape, 3 a vertex in its space;
+  const double *target; /* NULL, or where each vertex of `moving` lies on the fixed shape, 3 per vertex in its space;
                            replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
   int keeps_angles;     /* the spheres do (sheet/even.h); then embeddings made on the way do as well, and the places of
                            the targets are smoothed */

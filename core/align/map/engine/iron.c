@@ -1,5 +1,5 @@
-/* A part is what the marked vertices are connected to by edges between marked vertices. No triangle has vertices of two
- * parts, and vertices outside are pinned, so the parts do not see each other: each is kept or restored by itself. */
+/* A part is a set of marked vertices that edges between marked vertices connect. No triangle has vertices of two parts,
+ * and vertices outside are pinned, so the parts do not affect each other: each is kept or restored by itself. */
 #include "align/map/engine/iron.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@
 typedef struct ironing {
   orb_map_run *c;
   orb_map_level *l;
-  unsigned char *mark, *pinned; /* of the vertices of all parts; what was pinned before. Twice as much room for marks */
+  unsigned char *mark, *pinned; /* of the vertices of all parts, with room for as many again; what was pinned before */
   int32_t *part, *queue;        /* of each vertex, −1: none */
   int32_t parts;
   double *before, *after; /* energy of each part */
@@ -48,7 +48,7 @@ static void take_parts(ironing *w) {
   }
 }
 
-/* Holds all vertices outside of the parts, or lets them go again. */
+/* Pins all vertices outside of the parts, or releases them again. */
 static void hold_others(ironing *w, int hold) {
   for (int32_t v = 0; v < w->l->count; v++) {
     w->l->pinned[v] = w->pinned[v] || (hold && !w->mark[v]);

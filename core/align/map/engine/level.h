@@ -1,8 +1,7 @@
 /* The optimiser of the composed map: one level of the moving shape, whose vertices move over the fixed shape.
  *
- * Comes in: the fixed shape with its embedding, and a level of the moving shape with a point on the sphere for each
- * vertex. Goes out: the same level, with less energy and without flips where it had none or they could be cleared. Read
- * in this order:
+ * In: the fixed shape with its embedding, and a level of the moving shape with a point on the sphere for each vertex.
+ * Out: the same level, with less energy, and without flips if it had none or they could be cleared. Read in this order:
  *
  *   params.h          every threshold and weight of map/
  *   surface.h         the fixed shape, on which places move
@@ -59,7 +58,7 @@ typedef struct orb_map_rules {
   double still;   /* a vertex waits while it and its neighbours last moved by less than this */
 } orb_map_rules;
 
-/* Gathers the live vertices of a surface. position: 3 a vertex of the surface, area 4π at full resolution. params and
+/* Gathers the live vertices of a surface. position: 3 per vertex of the surface, area 4π at full resolution. params and
  * local (vertex_count) stay the caller's and must outlive the level. Does not set x, place, y, n, density, target and
  * pull. */
 ORB_MUST_CHECK orb_status orb_map_level_create(orb_context *ctx, const orb_map_params *params,
@@ -81,7 +80,7 @@ ORB_MUST_CHECK orb_status orb_map_level_locate_all(orb_context *ctx, orb_map_lev
 int32_t orb_map_level_flips(const orb_map_level *level);
 
 /* How many times a level covers the sphere; flipped triangles count against it. 1: once, as a map does. A triangle that
- * is drawn over half of the sphere changes it, and a level without flips may cover the sphere twice. */
+ * is drawn over half of the sphere changes the number, so a level without flips may cover the sphere twice. */
 int32_t orb_map_level_degree(const orb_map_level *level);
 
 /* Marks the vertices of the triangles whose symmetric Dirichlet energy is above a limit, and clears the other marks.

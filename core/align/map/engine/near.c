@@ -1,8 +1,8 @@
 /* A spatial start that is nearly a map: few triangles are still flipped, around vertices that are held.
  *
  * The held vertices near the flips are released, the flips are cleared without them, and the vertices are drawn back
- * while no flip is allowed. Where that fails, the vertices some rings away from the flips are still usable: the
- * landmark walk (starts/landmark_walk.c) goes to samples of them, which are better than the spatial targets alone.
+ * while no flip is allowed. If that fails, the vertices some rings away from the flips are still usable: the landmark
+ * walk (starts/landmark_walk.c) goes to samples of them, which are better than the spatial targets alone.
  */
 #include <math.h>
 #include <string.h>

@@ -7,8 +7,8 @@
 /* Is a level with this number of flips nearly a map? */
 int orb_map_is_near(const orb_map_level *level, int32_t flips);
 
-/* Releases held vertices near the flips, clears these, and holds the vertices at their points again. *flips: those that
- * are left, and vertices that did not come back. */
+/* Releases held vertices near the flips, clears the flips, and holds the vertices at their points again. *flips: the
+ * remaining flips, and vertices that did not come back. */
 ORB_MUST_CHECK orb_status orb_map_release(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh,
                                           int32_t *flips);
 

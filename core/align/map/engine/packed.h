@@ -14,7 +14,7 @@ typedef struct orb_map_packed {
   double *vertex_row;   /* ORB_MAP_ROW a vertex: position, point on the sphere, normal */
   double *triangle_row; /* ORB_MAP_ROW a triangle: derivatives of its second barycentric coordinate along both tangents,
                            and of the third; the tangents; the density. Without area the derivatives are NAN */
-  double *rotation;     /* 2 a half-edge: cosine and sine from the tangents of its triangle to those of its twin's */
+  double *rotation;     /* 2 per half-edge: cosine and sine from the tangents of its triangle to those of its twin's */
   int32_t *to, *from;   /* triangle numbers of the surface → packed ones, and back */
 } orb_map_packed;
 

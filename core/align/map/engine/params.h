@@ -33,33 +33,33 @@ enum {
 typedef struct orb_map_params {
   /* What the energy of a map says. */
   struct {
-    double good; /* up to here the shapes correspond and no further start is tried */
-    double poor; /* above it a start has been caught on the way */
-    double cap;  /* of one triangle; keeps a few that are nearly degenerate from hiding the others */
-    double bulk; /* the same for the bulk of a map, which says whether limbs go to their limbs, where the energy also
-                    says how much the map crumples, and that is close to chance. Of ten comparisons of a right match of
-                    people with a wrong one, the energy misled six times, the bulk never */
+    double good; /* up to this energy the shapes correspond, and no further start is tried */
+    double poor; /* above this energy a start has been caught on the way */
+    double cap;  /* of one triangle; keeps a few nearly degenerate ones from hiding the others */
+    double bulk; /* the cap for the bulk of a map, which says whether limbs go to their limbs. The energy also says how
+                    much the map crumples, and that is close to chance. Of ten comparisons of a right match of people
+                    with a wrong one, the energy misled six times, the bulk never */
   } energy;
 
-  /* How long to go on: more work finds better maps of shapes that differ, and takes longer. */
+  /* How long to continue: more work finds better maps of shapes that differ, and takes longer. */
   struct {
     int all;          /* for clearing flips and for further starts. Default: two meshes of 15,000 triangles align in
                          about 2 s */
-    int given_up;     /* what a start counts for that is given up at once. Without it the draws would go on for longer
-                         than if the start had run, and gain nothing */
-    int untwisted;    /* least left for registrations after an untwisting that helped */
-    int untwist;      /* least left for loosening while limbs are untwisted */
+    int given_up;     /* the work that a start counts for if it is given up at once. Without it the draws would run
+                         for longer than if the start had run, and gain nothing */
+    int untwisted;    /* least work left for registrations after an untwisting that helped */
+    int untwist;      /* least work left for loosening while limbs are untwisted */
     int passes;       /* most registrations through samples of the best map */
-    double pass_gain; /* a pass that does not bring the energy below this share of the last one ends the passes */
-    double far_above; /* a start registered through the best map whose first map has this many times the energy of that
-                         map is given up: in trials none came to a better one */
+    double pass_gain; /* passes end with one that does not bring the energy below this share of the last one's */
+    double far_above; /* a start registered through the best map is given up if its first map has this many times the
+                         energy of that map: in trials none came to a better one */
     int rough;        /* 1: the alignment as given is only refined far enough to be sampled */
   } work;
 
   /* Which shape moves. */
   struct {
-    double share; /* triangles of the moving shape whose images are inverted, as a share; fewer are no reason to swap */
-    double ratio; /* to the share with the shapes swapped: more are a reason */
+    double share; /* share of the moving shape's triangles whose images are inverted; fewer are no reason to swap */
+    double ratio; /* of that share to the share with the shapes swapped; more is a reason to swap */
   } swap;
 
   /* Levels of a start, and sweeps on them. */
@@ -78,10 +78,10 @@ typedef struct orb_map_params {
     int final_sweeps;   /* and on the level of all vertices */
     int rough_sweeps;   /* most sweeps on each level of a rough refinement */
     int32_t coarse;
-    int new_steps; /* steps of a vertex that has just come back */
-    double loosen; /* strength of the barrier while a level is loosened */
-    double rigid;  /* energy of a level up to which nothing has locked and it is not loosened, unless it is the last */
-    double pull;   /* of the spatial targets on the first level, */
+    int new_steps;    /* steps of a vertex that has just come back */
+    double loosen;    /* strength of the barrier while a level is loosened */
+    double rigid;     /* energy of a level up to which nothing locks, so that only the last level is loosened */
+    double pull;      /* of the spatial targets on the first level, */
     double pull_fall; /* and its factor from level to level */
   } level;
 
@@ -96,15 +96,15 @@ typedef struct orb_map_params {
 
   /* From targets that are given. */
   struct {
-    int work;        /* least that each step after the first has, as work.all: a start that is given up takes some */
+    int work;        /* least work of each step after the first, as work.all: a start that is given up takes some */
     double hopeless; /* energy of a start above which nothing else is tried */
     double alike;    /* energy up to which a map is good on spheres that keep areas: these shapes are alike, or agree in
-                        their landmarks' distances, so less is within reach than energy.good */
+                        the distances between their landmarks, so less than energy.good can be reached */
     double walked;   /* energy of all starts above which walks are tried. Maps of two people in other poses have
                         up to 1.5, and walks led to 0.1 to 0.5 more */
     double crumpled; /* energy of the first start up to which it is drawn at once */
-    double drawn;    /* above which the map is not drawn: it stays caught */
-    double gain;     /* a draw below this share of the energy before it opens the way for one more pass, */
+    double drawn;    /* energy above which the map is not drawn: it stays caught */
+    double gain;     /* a draw that brings the energy below this share opens the way for one more pass, */
     double enough;   /* unless the energy is below this, where a pass gains 1 % or less */
   } targets;
 
@@ -114,27 +114,27 @@ typedef struct orb_map_params {
     int sweeps;      /* most sweeps on the levels before it, */
     int last_sweeps; /* and on it */
     int loosen;      /* sweeps with flips allowed, and again without, of one loosening */
-    int loosen_most; /* loosenings of the last level. A level costs a tenth of all vertices: what is freed here is not
-                        left for them */
-    double gain;     /* of the energy, relative: a loosening that gains less is idle */
+    int loosen_most; /* loosenings of the last level. They cost a tenth of those with all vertices, and leave little to
+                        loosen there */
+    double gain;     /* of the energy, relative: a loosening that gains less counts as idle */
     double
         barriers[2]; /* of a loosening, and of the one after an idle one: a weak barrier frees more, and folds more */
-    double hopeless; /* energy of the first level above which the walk has twisted limbs, and no finer level helps */
-    double twisted;  /* the same of the last level */
-    int work;        /* least that each guided walk has, as work.all */
+    double hopeless; /* energy of the first level above which the walk has twisted limbs that no finer level repairs */
+    double twisted;  /* the same for the last level */
+    int work;        /* least work of each guided walk, as work.all */
     int32_t guides[ORB_MAP_GUIDED];  /* samples of the spatial targets that guide one walk each, spread over the moving
                          shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
                          walk get stuck, and which is best is close to chance */
-    int32_t few[ORB_MAP_GUIDED_FEW]; /* the same where none of these led to a map: a blade has no room for more */
+    int32_t few[ORB_MAP_GUIDED_FEW]; /* the same if none of these led to a map: a blade has no room for more */
     double enough;                   /* energy of a coarse map up to which no further walk is tried */
     int beat_most;                   /* most walks where run->beat is known */
-    double agree;                    /* relative difference of two such energies up to which none is: both walks came to
-                                        one basin */
+    double agree;                    /* relative difference of two such energies up to which no further one is tried:
+                                        both walks came to one basin */
   } walked;
 
   /* Sweeps over a level. */
   struct {
-    double still;        /* of a mean edge: a vertex that moved less, like its neighbours, waits. More is faster */
+    double still;        /* of a mean edge: a vertex that moved less waits, if its neighbours did too. More is faster */
     int32_t still_share; /* sweeps end when at most one vertex in this many does not wait */
     double over;         /* over-relaxation where no flip is allowed; 1: none */
   } sweep;
@@ -165,16 +165,16 @@ typedef struct orb_map_params {
 
   /* Clearing flips: rounds of sweeps against a growing barrier, then untangling. */
   struct {
-    int32_t hopeless;      /* one flip in fewer triangles than this: the start is given up */
-    int32_t unfold;        /* at most one flip in so many triangles is unfolded where no targets are given: these starts
+    int32_t hopeless;      /* if more than one in this many triangles is flipped, the start is given up */
+    int32_t unfold;        /* at most one flip in this many triangles is unfolded if no targets are given: these starts
                               compete with walks, which are better than what a large fold leaves */
     int rounds;            /* of a start */
     int sweeps;            /* of a round */
     double first_barrier;  /* strength in the first round. A weak one lets triangles pass each other */
     double again;          /* factor on it in a second attempt */
     double barrier_growth; /* from round to round */
-    double flip_growth;    /* more flips than after the first round, by this factor, end the rounds: the harder the
-                              barrier the more flips means that large parts are folded */
+    double flip_growth;    /* the rounds end if there are more flips than after the first round, by this factor: if a
+                              harder barrier makes more flips, large parts are folded */
     int loosen_rounds;     /* after loosening, where few flips are expected */
   } clear;
 
@@ -183,9 +183,9 @@ typedef struct orb_map_params {
     int rounds;     /* most */
     int stale;      /* rounds without fewer flips that end it */
     int passes;     /* over the vertices of a round */
-    int rings_most; /* around the flips that may move; the first round has one ring, each fourth adds one */
-    int32_t few;    /* flips up to which ε belongs to each star: the last few hide in stars that are far smaller
-                       than an ε for all */
+    int rings_most; /* rings around the flips that may move: one in the first round, and one more every fourth */
+    int32_t few;    /* flips up to which each star has its own ε: the last few hide in stars that are far smaller
+                       than a common ε */
     int tries;      /* lengths of a step */
     double shorten; /* a try's length relative to the one before it */
     double star_mean, star_worst; /* ε of a star: these shares of its mean absolute determinant and of its worst one,
@@ -199,9 +199,9 @@ typedef struct orb_map_params {
   struct {
     struct {
       double crumpled; /* energy above which a triangle is set anew, */
-      int rings;       /* with so many rings around it. Which are best differs from part to part */
+      int rings;       /* with this many rings around it. Which are best differs from part to part */
     } round[ORB_MAP_IRON_ROUNDS];
-    double enough; /* energy of a map that is not ironed */
+    double enough; /* energy up to which a map is not ironed */
     double gain;   /* of the energy, relative: a round that gains less is the last */
     int sweeps;    /* of a round, */
     int loosen;    /* and of its loosening */
@@ -228,9 +228,9 @@ typedef struct orb_map_params {
 
   /* A start that is nearly a map. */
   struct {
-    int32_t few;      /* at most one flip in so many triangles: the start is nearly a map */
+    int32_t few;      /* at most one flip in this many triangles: the start is nearly a map */
     int rings;        /* around the flips in which held vertices are released */
-    int usable_rings; /* around the flips whose vertices are not used as samples */
+    int usable_rings; /* rings around the flips whose vertices do not serve as samples */
     int clearings;    /* rounds of clearing with the vertices released */
     int home_rounds;  /* most, of drawing released vertices back; the pull doubles from round to round */
     int home_sweeps;  /* of a round */
@@ -239,8 +239,8 @@ typedef struct orb_map_params {
 
   /* The landmark walk. */
   struct {
-    int32_t samples;        /* of the spatial targets that are walked to; more guide the walk and make it get stuck */
-    int32_t usable_samples; /* the same of what is usable of a start that was nearly a map */
+    int32_t samples;        /* of the spatial targets that are walked to; more guide the walk, but make it get stuck */
+    int32_t usable_samples; /* the same for the usable part of a start that was nearly a map */
     int32_t least_each;     /* vertices of the moving shape for each sample; a shape with fewer gets no samples */
     int32_t level;          /* least vertices of the coarse level, */
     int32_t level_each;     /* and for each pair */
@@ -268,9 +268,9 @@ typedef struct orb_map_params {
   struct {
     int32_t size;            /* vertices of the copies that vibrate */
     int32_t least_landmarks; /* with fewer, nothing tells whether a spectral map is right */
-    double agrees; /* mean distance of landmarks from where the map takes them, up to which it is used. True maps
-                      of eight posed pairs had 0.01 to 0.11, other maps 0.08 and more, in the pairs of
-                      docs/bench-truth.md those of animals 0.11 and more */
+    double agrees; /* mean distance of landmarks from where the map takes them, up to which the map is used. True maps
+                      of eight posed pairs had 0.01 to 0.11, other maps 0.08 and more; those of animals in the pairs of
+                      docs/bench-truth.md had 0.11 and more */
   } spectral;
 
   /* Non-rigid registration in space. */
@@ -295,8 +295,8 @@ typedef struct orb_map_params {
 
   /* The place of each spatial target on the fixed shape. */
   struct {
-    double facing;        /* least cosine between the normals at the nearest point. With less, a start on spheres that
-                             keep angles doubts the place; elsewhere vertices compete instead by */
+    double facing;        /* least cosine between the normals at the nearest point. Below it, a start on spheres that
+                             keep angles doubts the place; other starts let vertices compete by */
     double normal_weight; /* distance and this weight of |n − n'|² against |x − x'|² */
     int32_t search;       /* triangles beyond which only every second, third, … is searched for a vertex */
     double jitter;        /* of barycentric coordinates: vertices that share a point cannot be untangled */
@@ -312,7 +312,7 @@ typedef struct orb_map_params {
     double reach;           /* a vertex follows its neighbours within this distance. Three times as much draws arms
                                towards their shoulders, which are larger on the sphere */
     double folded;          /* factor on the trust in the target of a vertex of a flipped triangle, in each round.
-                               Smaller ones let whole limbs go, 1 leaves the pockets of faces folded */
+                               Smaller factors let whole limbs go, 1 leaves the pockets of faces folded */
     double apart;           /* a target farther than this from those of most neighbours is an outlier: a few edges */
     double outlier;         /* distance from its target at which a vertex counts a quarter */
     double least_cotangent; /* of an edge: obtuse triangles would push their neighbours away, */
@@ -336,7 +336,7 @@ typedef struct orb_map_params {
 
   /* Untwisting them. */
   struct {
-    double early_energy; /* a rough map with more energy, */
+    double early_energy; /* a rough map with more energy than this, */
     double early_kept;   /* and less than this share of the area halfway, is untwisted before it is drawn. Elsewhere
                             that did not help */
     int steps;           /* by which limbs are untwisted where one step folds them */
@@ -347,7 +347,7 @@ typedef struct orb_map_params {
   } untwist;
 } orb_map_params;
 
-/* The values for a preset. `fast` composes no map; where a coarse copy is composed it has the values of `default`. */
+/* The values for a preset. `fast` composes no map; if it composes a coarse copy, it uses the values of `default`. */
 orb_map_params orb_map_params_of(orb_preset preset);
 /* Vertices of the coarsest level of a map that `held` landmarks hold. */
 int32_t orb_map_keep_until(const orb_map_params *params, int32_t held);

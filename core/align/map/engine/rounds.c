@@ -61,8 +61,8 @@ void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_
 }
 
 /* Clears the flips of a level, by untangling and then by unfolding what is left. *flips: those that the attempt left;
- * if there are any, the level is as it was. Either may draw a triangle over half of the sphere, and then all flips go,
- * but the level covers the sphere twice. So a step that does this to a level that covered it once is undone. */
+ * if there are any, the level is as it was. Either step may draw a triangle over half of the sphere: then no flip
+ * remains, but the level covers the sphere twice. If it covered the sphere once before, that step is undone. */
 static orb_status clear_now(orb_map_run *c, orb_map_level *l, double *copy, int32_t *flips) {
   const orb_map_params *params = &c->params;
   const size_t size = 3 * (size_t)l->count * sizeof *copy;
@@ -173,7 +173,7 @@ done:
 }
 
 /* One round: sweeps with flips allowed while the pull is on, clears the flips, and sweeps without flips. *held 0: the
- * flips cannot be cleared, and the level is as it was but for the last sweeps. */
+ * flips cannot be cleared, and the level is as it was except for the last sweeps. */
 static orb_status draw_round(orb_map_run *c, orb_map_level *l, int *held) {
   const orb_map_params *params = &c->params;
   orb_map_copy before = {0};

@@ -50,10 +50,10 @@ typedef struct orb_map_run {
   orb_map_candidate kept;     /* the best map from before they changed */
   double *x, *normal;         /* moving shape, area 4π */
   int keeps_angles;           /* see orb_map_guide */
-  orb_map_beat beat;          /* likewise */
-  int walks_first;            /* likewise */
-  orb_map_course course;      /* likewise; its bulks only where they are asked for */
-  int wants_course;           /* they are */
+  orb_map_beat beat;          /* see orb_map_guide */
+  int walks_first;            /* see orb_map_guide */
+  orb_map_course course;      /* see orb_map_guide; its bulks are measured only if asked for */
+  int wants_course;           /* whether they are asked for */
   const double *given_target; /* for registrations without samples, in the fixed shape's space; NULL: computed */
   int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
   int starts_smooth;          /* the first start from given targets has followed smoothed ones */
@@ -72,7 +72,7 @@ typedef struct orb_map_run {
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
   double hopeless;        /* a start whose first map has more energy is given up */
-  int32_t hopeless_flips; /* a start with more than one flip in so many triangles is given up */
+  int32_t hopeless_flips; /* a start with more than one flip in this many triangles is given up */
   double twisted_energy;  /* of the last map that was to be untwisted */
   int passes;             /* registrations through samples of the best map that are left */
   int64_t work;           /* vertex steps left for clearing flips and for further starts */
@@ -86,9 +86,9 @@ ORB_MUST_CHECK orb_status orb_map_energy_of(orb_map_run *run, const double *poin
 ORB_MUST_CHECK orb_status orb_map_full_level(orb_map_run *run, const double *points, const orb_corner_table *s,
                                              orb_map_level *level);
 
-/* Gives the fixed shape other points, 3 a vertex; the run takes *points over and sets it to NULL. Places on the shape
+/* Gives the fixed shape other points, 3 per vertex; the run takes *points over and sets it to NULL. Places on the shape
  * stay what they are. The best map so far is set aside as run->kept, which must be empty; run->best becomes run->start,
- * of no energy yet. */
+ * whose energy is not known yet. */
 ORB_MUST_CHECK orb_status orb_map_take_sphere(orb_map_run *run, double **points);
 
 /* Makes the better of run->best and run->kept run->best, with its points of the fixed shape. */

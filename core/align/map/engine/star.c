@@ -59,7 +59,7 @@ ORB_CLONES static void derive(orb_map_lanes *l, const double *x, double hinge) {
   }
 }
 
-/* Where the three normals cancel, the triangle's own normal is used. */
+/* Uses the triangle's own normal where the three normals cancel. */
 static void set_upright(orb_map_lanes *l, int i, const double y[3]) {
   const double q[3] = {l->q[0][i], l->q[1][i], l->q[2][i]};
   const double side[3] = {l->r[0][i] - q[0], l->r[1][i] - q[1], l->r[2][i] - q[2]};

@@ -11,12 +11,12 @@
 /* A surface on which places move. Scaled to area 4π around its centre. */
 typedef struct orb_map_surface {
   int32_t vertex_count, triangle_count;
-  double *x;       /* positions, 3 a vertex */
-  double *normal;  /* unit, angle-weighted, 3 a vertex */
+  double *x;       /* positions, 3 per vertex */
+  double *normal;  /* unit, angle-weighted, 3 per vertex */
   const double *s; /* on the sphere, borrowed */
   const int32_t *triangles;
   int32_t *twin;
-  double *frame;   /* 6 a triangle: two orthonormal tangents */
+  double *frame;   /* 6 per triangle: two orthonormal tangents */
   double *density; /* a triangle: sphere determinant over twice its area */
   double centre[3], scale;
   orb_locator *locator;

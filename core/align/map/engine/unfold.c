@@ -1,12 +1,12 @@
 /* Unfolding by collapses.
  *
- * A vertex may be collapsed onto a neighbour if the neighbour sees the whole ring: then the ring is a fan of positive
- * triangles from a vertex of its own, its kernel is not empty, and the collapsed vertex can always come back into it.
- * So vertices of flipped triangles are collapsed until no flip is left; then they come back in reverse order. Where no
- * collapse lowers the number of flips, one that keeps it removes a vertex of the fold all the same. Nothing moves but
- * the vertices that were collapsed and their rings. As soon as a vertex is back, it and its ring move towards their
- * places from before, or, where they are cramped, to the middles of their rings: kernels inside kernels shrink fast,
- * and without these moves doubles cannot hold what comes back into a large fold.
+ * A vertex may be collapsed onto a neighbour that sees the whole ring. Then the ring is a fan of positive triangles
+ * from one of its vertices, its kernel is not empty, and the collapsed vertex can always come back into it. So vertices
+ * of flipped triangles are collapsed until no flip is left; then they come back in reverse order. If no collapse lowers
+ * the number of flips, one that keeps it still removes a vertex of the fold. Nothing moves but the collapsed vertices
+ * and their rings. As soon as a vertex is back, it and its ring move towards their old places or, where they are
+ * cramped, to the middles of their rings: kernels inside kernels shrink fast, and without these moves doubles cannot
+ * hold what comes back into a large fold.
  *
  * Source: Shen, Jiang, Zorin & Panozzo 2019, "Progressive embedding" (collapse until nothing is flipped, and optimise
  * around each vertex that comes back).
@@ -32,13 +32,13 @@ enum {
 enum allowed {
   FEWER, /* those that lower the number of flips */
   EQUAL, /* of vertices of flipped triangles, those that do not raise it */
-  THIN   /* of all vertices: where fewer are left, folds are simpler */
+  THIN   /* of any vertex: with fewer vertices, folds are simpler */
 };
-/* Least determinants of a triangle over its squared edge on the ring: a vertex there comes back where it was; a vertex
- * with more than the second may move so far. The first is what doubles hold with ease, the second a fifth of an
+/* Least determinants of a triangle over its squared edge on the ring. With the first, a vertex comes back to where it
+ * was; with more than the second, it may move. The first is what doubles hold with ease, the second a fifth of an
  * equilateral triangle. */
 static const double WELL_INSIDE = 0.02, SEATED = 0.1;
-static const double GAIN = 1.02;      /* a cramped vertex moves where that raises its least determinant so much */
+static const double GAIN = 1.02;      /* a cramped vertex moves if that raises its least determinant by this factor */
 enum { HALVINGS = 3, RELAXINGS = 2 }; /* of a way that is tried; of a ring around a vertex that is back */
 
 typedef struct collapse {
@@ -156,7 +156,7 @@ static void apply(unfolding *u, int32_t v, const int32_t *star, int count, int k
   u->corner[v] = -1;
 }
 
-/* Undoes a collapse. The triangles that went know their neighbours still. */
+/* Undoes a collapse. The removed triangles still know their neighbours. */
 static void split(unfolding *u, const collapse *c) {
   const int32_t *spoke = u->spoke + c->first, *ring = u->ring + c->first;
   const int32_t first = spoke[0], last = spoke[c->count - 1];
@@ -214,7 +214,7 @@ static void run_queue(unfolding *u) {
   }
 }
 
-/* Collapses one vertex near a flipped triangle: of its own, or a neighbour of these. Returns whether it did. */
+/* Collapses one vertex near a flipped triangle: one of its own, or a neighbour of these. Returns whether it did. */
 static int try_triangle(unfolding *u, int32_t t, enum allowed allowed) {
   for (int k = 0; k < 3; k++) {
     int32_t star[RING_MOST], v = u->triangle[3 * (size_t)t + (size_t)k];
@@ -253,7 +253,7 @@ static void collapse_all(unfolding *u) {
   }
 }
 
-/* Does the ring see the point well? */
+/* Does the point lie well inside the ring? */
 static int is_inside(const double (*ring)[3], int32_t count, const double p[3]) {
   for (int32_t i = 0; i < count; i++) {
     const double *a = ring[i], *b = ring[i + 1 < count ? i + 1 : 0];
@@ -264,7 +264,7 @@ static int is_inside(const double (*ring)[3], int32_t count, const double p[3]) 
   return 1;
 }
 
-/* How well a star sees the point p: its least determinant over squared edge. Not positive: p flips a triangle. */
+/* How well a star holds the point p: its least determinant over squared edge. Not positive: p flips a triangle. */
 static double seat_of(const unfolding *u, const int32_t *star, int count, const double p[3]) {
   double least = INFINITY;
   for (int i = 0; i < count; i++) {
@@ -274,7 +274,7 @@ static double seat_of(const unfolding *u, const int32_t *star, int count, const 
   return least;
 }
 
-/* Decided exactly. */
+/* Whether p flips no triangle of the star, decided exactly. */
 static int flips_nothing(const unfolding *u, const int32_t *star, int count, const double p[3]) {
   for (int i = 0; i < count; i++) {
     if (orb_orient(p, at(u, end_of(u, star[i])), at(u, end_of(u, star[(i + 1) % count]))) <= 0) {
@@ -284,7 +284,7 @@ static int flips_nothing(const unfolding *u, const int32_t *star, int count, con
   return 1;
 }
 
-/* Moves v towards a point as far as its star sees it: at least with `enough`, or better than now. */
+/* Moves v towards a point as far as its star holds it: with at least `enough`, or better than now. */
 static int approach(unfolding *u, int32_t v, const int32_t *star, int count, const double to[3], double enough) {
   double *x = u->l->x + 3 * (size_t)v, share = 1;
   const double now = seat_of(u, star, count, x);
@@ -303,7 +303,7 @@ static int approach(unfolding *u, int32_t v, const int32_t *star, int count, con
   return 0;
 }
 
-/* Moves v home as far as its star sees it well, or else, if it is cramped, towards the middle of its ring. */
+/* Moves v home as far as its star holds it well, or else, if it is cramped, towards the middle of its ring. */
 static void relax(unfolding *u, int32_t v) {
   int32_t star[RING_MOST];
   double middle[3] = {0};
@@ -328,7 +328,7 @@ static void relax_around(unfolding *u, const collapse *c) {
   }
 }
 
-/* The collapsed vertices come back, the last one first. */
+/* Brings back the collapsed vertices, the last one first. */
 static orb_status bring_back(unfolding *u, int *all) {
   orb_kernel_room room = {0};
   orb_status status = ORB_OK;
@@ -459,6 +459,6 @@ orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *l, int32_t *lef
 
 orb_status orb_map_level_set_anew(orb_context *ctx, orb_map_level *l, const unsigned char *mark) {
   unfolding u = {.ctx = ctx, .l = l};
-  int all; /* else the level stays as it is, which is right too */
+  int all; /* otherwise the level stays as it is, which is right too */
   return run(&u, mark, &all);
 }

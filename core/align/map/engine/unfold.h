@@ -6,8 +6,8 @@
 #include "align/map/engine/level.h"
 
 /* Moves vertices around flipped triangles so that no triangle of the level is flipped. Pinned vertices stay. Only x
- * changes; the caller locates the vertices again. *left: 0, or flips that remain, and then nothing has changed: pinned
- * vertices are folded among themselves, or doubles have no room. O(n + size of the folds). */
+ * changes; the caller locates the vertices again. *left: 0, or the number of flips that remain. In that case nothing
+ * has changed: pinned vertices are folded among themselves, or doubles have no room. O(n + size of the folds). */
 ORB_MUST_CHECK orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *level, int32_t *left);
 
 /* Sets the marked vertices of a level without flips anew: collapses them onto what surrounds them, and lets them come

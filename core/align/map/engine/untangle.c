@@ -20,7 +20,7 @@
 
 enum { FLIP_GRAIN = 1024, CHECK_EVERY = 4096 }; /* triangles of one task; vertices between checks for cancellation */
 enum { RING_ROUNDS = 4 };                       /* rounds after which one more ring around the flips may move */
-enum { SHARED_ROUNDS = 3 };                     /* of so many rounds with many flips, one has an ε for each star */
+enum { SHARED_ROUNDS = 3 };                     /* one in this many rounds with many flips has an ε for each star */
 static const double LEAST_EPSILON = 1e-100;     /* keeps ε above 0 in a star whose triangles are all points */
 static const double LONGEST_STEP = 0.5; /* radians, about: the energy of a longer one is not that of the plane */
 
@@ -192,7 +192,7 @@ static int by_size(const void *a, const void *b) {
   return x->size != y->size ? (x->size < y->size) - (x->size > y->size) : (x->first > y->first) - (x->first < y->first);
 }
 
-/* Joins the marked vertices that an edge joins; the lowest of each island represents it. */
+/* Joins marked vertices along edges; the lowest vertex of each island represents it. */
 static void join_islands(islands *is, const unsigned char *mark) {
   const orb_map_level *l = is->level;
   for (int32_t v = 0; v < l->count; v++) {

@@ -78,8 +78,8 @@ static int is_apart(const orb_map_run *c, int32_t moving, int32_t fixed) {
   return 1;
 }
 
-/* Adds samples of the spatial targets behind the pairs, where the targets lie well on the fixed shape. *count: the
- * pairs with them. */
+/* Adds samples of the spatial targets after the pairs, where the targets lie well on the fixed shape. *count: the
+ * number of pairs and samples. */
 static orb_status sample_targets(orb_map_run *c, int32_t samples, int32_t *count) {
   const orb_map_surface *b = &c->b;
   int32_t held = c->pairs.count, *spread = ORB_NEW(c->ctx, int32_t, samples);

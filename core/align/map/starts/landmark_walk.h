@@ -13,7 +13,7 @@ ORB_MUST_CHECK orb_status orb_map_pairs_create(orb_map_run *run);
  * else carries the map to it. *stuck: nothing was found, and nothing has changed. */
 ORB_MUST_CHECK orb_status orb_map_landmark_walk(orb_map_run *run, int32_t samples, int *stuck);
 
-/* The same for the level of the moving shape on which the pairs meet, and new points of the fixed shape (3 a vertex).
+/* The same for the level of the moving shape on which the pairs meet, and new points of the fixed shape (3 per vertex).
  * Where that gets stuck without samples, only the landmarks walk, on a finer level. The run does not change. The caller
  * frees both. */
 ORB_MUST_CHECK orb_status orb_map_walk_level(orb_map_run *run, int32_t samples, orb_walk_level *level, double **fixed,

@@ -39,8 +39,8 @@ static orb_place nearest_with_normal(const orb_map_run *c, int32_t v) {
   return place;
 }
 
-/* The nearest point. Where the surface faces another way there, a start that smooths doubts it; others take the nearest
- * vertex in position and normal instead, which may lie on another limb. */
+/* Finds the nearest point. If the surface faces another way there, a start that smooths doubts it; other starts take
+ * the nearest vertex in position and normal instead, which may lie on another limb. */
 static void find_target_places(void *arg, int64_t begin, int64_t end, int thread) {
   target_job *job = arg;
   orb_map_run *c = job->c;
@@ -65,14 +65,14 @@ static int is_paired(const orb_map_run *c, int32_t moving) {
   return paired;
 }
 
-/* Where vertex v goes by the given targets, in the scale of the fixed shape. */
+/* Computes where the given targets take vertex v, in the scale of the fixed shape. */
 static void scaled_target(const orb_map_run *c, int32_t v, double out[3]) {
   for (size_t k = 0; k < 3; k++) {
     out[k] = (c->given_target[3 * (size_t)v + k] - c->b.centre[k]) * c->b.scale;
   }
 }
 
-/* Where a sample goes. */
+/* Computes where a sample goes. */
 static void sample_target(const orb_map_run *c, int32_t v, double out[3]) {
   orb_place place;
   if (c->samples_follow_target) {

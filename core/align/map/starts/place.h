@@ -1,7 +1,7 @@
 /* First maps for the starts of a composed map: where each vertex of the moving shape goes on the fixed one.
  *
- * Comes in: a run (engine/run.h) with both shapes and their landmarks. Goes out: its pairs, its spatial targets, and
- * levels with their vertices placed. Read in this order:
+ * In: a run (engine/run.h) with both shapes and their landmarks. Out: its pairs, its spatial targets, and levels with
+ * their vertices placed. Read in this order:
  *
  *   mirror.h         mirror landmarks
  *   spectral_samples.h  samples that correspond by eigenfunctions

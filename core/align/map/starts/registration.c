@@ -44,13 +44,13 @@ typedef struct targets_run {
   int32_t stride;   /* through the fixed shape's vertices */
   int32_t *control; /* farthest points of the moving shape */
   int32_t control_count;
-  double *target;   /* 3 a control */
-  double *mapped;   /* 6 a control: position and normal under the spline */
+  double *target;   /* 3 per control */
+  double *mapped;   /* 6 per control: position and normal under the spline */
   double *distance; /* of each control to its target, squared, with the normals' part; negative: faces away */
   spline s;
   double base[12]; /* the similarity that the spline departs from, laid out like its affine part */
   double *matrix;
-  double *out; /* targets, 3 a vertex */
+  double *out; /* targets, 3 per vertex */
 } targets_run;
 
 /* The spline at p, and its Jacobian (row-major; NULL: not needed). */

@@ -15,7 +15,7 @@ typedef struct orb_map_anchors {
 
 /* Spatial targets: where each vertex of the moving shape lies once the shape is registered to the fixed one in space,
  * by a thin-plate spline through the anchors and annealed non-rigid ICP. With fewer than four anchors, rigid ICP from
- * 24 rotations comes first. x, normal: of the moving shape, scaled like orb_map_surface; out: 3 a vertex. *fit: mean
+ * 24 rotations comes first. x, normal: of the moving shape, scaled like orb_map_surface; out: 3 per vertex. *fit: mean
  * distance from the fixed shape at the end. */
 ORB_MUST_CHECK orb_status orb_map_register_in_space(orb_context *ctx, const orb_map_params *params,
                                                     const orb_map_surface *b, const double *x, const double *normal,

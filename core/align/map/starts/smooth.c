@@ -1,7 +1,7 @@
 /* Minimises ∫ |∇x|² + trust · |x − target|² / reach² over the moving shape by over-relaxed Gauss–Seidel sweeps, where x
  * is the point on the sphere; outliers have no trust. Then trusts each target by how far x has moved from it, measured
- * on the fixed shape, and less where triangles are flipped; and so on (iteratively reweighted least squares). So a fold
- * is smoothed over a growing distance, and all other places stay where they are. Between the rounds x is not
+ * on the fixed shape, and less where triangles are flipped. Repeats both (iteratively reweighted least squares). So a
+ * fold is smoothed over a growing distance, and all other places stay where they are. Between the rounds x is not
  * normalised: it stays near the sphere. */
 #include "align/map/starts/smooth.h"
 
@@ -23,10 +23,10 @@ typedef struct smooth_edge {
 typedef struct smoothing {
   orb_map_level *level;
   const orb_map_params *params;
-  double *target;    /* 3 a vertex: where it was placed, on the sphere */
+  double *target;    /* 3 per vertex: where it was placed, on the sphere */
   double *trust;     /* 0 to 1 */
   double *smooth;    /* likewise: 0 for outliers, else how long a vertex has been without flips */
-  double *point;     /* 4 a vertex, the last unused: where it is now */
+  double *point;     /* 4 per vertex, the last unused: where it is now */
   int32_t *row;      /* of the i-th vertex of by_colour: its first edge */
   smooth_edge *edge; /* to the neighbours, in that order */
 } smoothing;
@@ -121,7 +121,8 @@ static void doubt_folds(const smoothing *s) {
   }
 }
 
-/* Trusts the targets anew. The density of the fixed shape takes distances on the sphere to distances on that shape. */
+/* Weighs the targets anew. The density of the fixed shape converts distances on the sphere to distances on that shape.
+ */
 static void weigh(const smoothing *s) {
   const orb_map_level *l = s->level;
   const double outlier = s->params->smooth.outlier;

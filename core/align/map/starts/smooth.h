@@ -1,8 +1,8 @@
 /* Smooths the places of a start from spatial targets.
  *
- * The nearest places of a shape that lies near the fixed one are a map but for noise and outliers: neighbours that
+ * The nearest places of a shape that lies near the fixed one are a map except for noise and outliers: neighbours that
  * change places, and parts of a limb that found the limb beside it. Both make folds, which clearing flips cannot always
- * undo. On the sphere, an outlier is far from where its neighbours are, even where limbs touch in space. */
+ * undo. On the sphere, an outlier is far from its neighbours, even where limbs touch in space. */
 #ifndef ORB_ALIGN_MAP_STARTS_SMOOTH_H
 #define ORB_ALIGN_MAP_STARTS_SMOOTH_H
 

@@ -8,10 +8,10 @@
 typedef struct orb_map_image {
   int32_t vertex_count, triangle_count;
   const int32_t *triangles;
-  const double *x, *points; /* 3 a vertex; without flips */
+  const double *x, *points; /* 3 per vertex; without flips */
 } orb_map_image;
 
-/* For every vertex of the surface: where it comes from (back, 3 a vertex), and the angle by which the map rotates its
+/* For every vertex of the surface: where it comes from (back, 3 per vertex), and the angle by which the map rotates its
  * surroundings in space, against the rotation of the whole. *kept: as in orb_map_twists (twist.h). O(n). */
 ORB_MUST_CHECK orb_status orb_map_rotations_measure(orb_context *ctx, const orb_map_surface *b,
                                                     const orb_map_image *map, double *back, double *angle,

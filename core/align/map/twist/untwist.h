@@ -1,7 +1,7 @@
 /* Untwisting the limbs of the best map.
  *
- * Comes in: a run (engine/run.h) and its best map. Goes out: the same, with a better best map if untwisting helped.
- * Read in this order:
+ * In: a run (engine/run.h) and its best map. Out: the same, with a better best map if untwisting helped. Read in this
+ * order:
  *
  *   rotations.h  how a map rotates the surroundings of each vertex in space
  *   limb.h       rings around a limb, and rotations along them
@@ -14,7 +14,7 @@
 #include "align/map/engine/run.h"
 
 /* Untwists the limbs of the best map: all at once, by steps, or one by one. The result replaces the best map if it is
- * better. Does nothing if halfway through the morph more than this share of the area is kept. */
+ * better. Does nothing if more than this share of the area is kept halfway through the morph. */
 ORB_MUST_CHECK orb_status orb_map_untwist(orb_map_run *run, double most_kept);
 
 #endif

@@ -1,4 +1,4 @@
-/* What a collapse costs.
+/* The cost of a collapse.
  *
  * Collapsing v into its neighbour r_j leaves the triangles r_j r_{j+i} r_{j+i+1}. The cost is the sum of S²/A over them
  * (S the sum of squared edges, A the area, at least S/1000; small and round is cheap). A triangle that faces against

@@ -2,7 +2,7 @@
  *
  * The shapes are computed here, from the positions of the ring, although each triangle lies in three stars: reading
  * them from a table of triangles would miss the cache as often as reading positions does, and the table would cost 16
- * bytes a triangle. */
+ * bytes per triangle. */
 
 static const double FILL_TINY2 = 1e-30, FILL_FLAT = 1e-6; /* TINY2 and FLAT of star.c */
 
@@ -25,7 +25,7 @@ static inline void fill_walk(const orb_corner_table *s, const int32_t *vertex, c
   }
 }
 
-/* Positions, 3 a vertex. */
+/* Positions, 3 per vertex. */
 static inline void fill_gather(const double *position, const int32_t *id, vd out[3]) {
   double lane[3][LANES];
   for (int l = 0; l < LANES; l++) {

@@ -29,19 +29,19 @@ typedef struct orb_newton_energy {
 
 /* One coloured Gauss–Seidel pass over batches of one colour: level.h has the layout. */
 typedef struct orb_sweep_job {
-  double *point;              /* 4 a vertex */
-  const int32_t *vertex;      /* lanes a batch; the last one repeats where a batch is not full */
+  double *point;              /* 4 per vertex */
+  const int32_t *vertex;      /* lanes per batch; the last one repeats where a batch is not full */
   const unsigned char *fill;  /* lanes of a batch that count */
   const unsigned char *count; /* of each lane: its neighbours, ascending within a batch */
   const int32_t *valence;     /* of each batch: the most neighbours of a lane */
   const int64_t *offset;      /* of each batch's first ring entry, in lanes */
-  const int32_t *ring;        /* lanes a ring entry: vertex numbers */
-  const float *shape;         /* 4·lanes a ring entry: half cotangents at ring[i+1], at ring[i], at v; doubled area */
-  orb_newton_energy weight;   /* of the parts of the energy */
-  double relax;               /* the over-relaxation factor */
-  double scale;               /* about the reciprocal of an edge on the sphere */
-  double *energy, *fall;      /* of each batch: the energy of its stars before the pass, and how far it fell */
-  uint16_t *stiff;            /* of each batch: bit l is set where lane l was too thin to be moved in plain doubles */
+  const int32_t *ring;        /* lanes per ring entry: vertex numbers */
+  const float *shape;       /* 4·lanes per ring entry: half cotangents at ring[i+1], at ring[i], at v; doubled area */
+  orb_newton_energy weight; /* of the parts of the energy */
+  double relax;             /* the over-relaxation factor */
+  double scale;             /* about the reciprocal of an edge on the sphere */
+  double *energy, *fall;    /* of each batch: the energy of its stars before the pass, and how far it fell */
+  uint16_t *stiff;          /* of each batch: bit l is set where lane l was too thin to be moved in plain doubles */
 } orb_sweep_job;
 
 /* Fills the rings and shapes of batches whose vertices are set. */
@@ -60,7 +60,7 @@ typedef struct orb_fill_job {
 /* One version of the loops. */
 typedef struct orb_vector_loops {
   const char *name;
-  int lanes; /* vertices a batch, 16 at most */
+  int lanes; /* vertices per batch, 16 at most */
   void (*costs)(const orb_cost_job *job, int64_t begin, int64_t end);
   void (*fill)(const orb_fill_job *job, int64_t begin, int64_t end);
   void (*sweep)(const orb_sweep_job *job, int64_t begin, int64_t end);

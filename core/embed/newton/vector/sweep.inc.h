@@ -216,7 +216,8 @@ static void sweep_in_doubles(const orb_sweep_job *job, int64_t batch) {
   job->fall[batch] = fall;
 }
 
-/* Some batches side by side, stage by stage: a stage is short enough for the processor to overlap its batches. */
+/* Sweeps some batches side by side, stage by stage: a stage is short enough for the processor to overlap its batches.
+ */
 static void sweep_group(const orb_sweep_job *job, int64_t first, int count) {
   sweep_whole group[SWEEP_GROUP];
   const sweep_weights_floats w = sweep_weights_of_floats(&job->weight);

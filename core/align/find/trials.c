@@ -1,0 +1,310 @@
+#include "align/find/trials.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/map/engine/surface.h"
+#include "align/rotate/correlate.h"
+#include "align/rotate/procrustes.h"
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "numeric/rotation.h"
+#include "numeric/vec3.h"
+#include "orbmorph/locate.h"
+
+static void scaling_of(const orb_mesh *mesh, orb_trial_scaling *out) {
+  orb_extent extent;
+  orb_mesh_extent(mesh, &extent);
+  out->scale = extent.area > 0 ? sqrt(4 * M_PI / extent.area) : 1;
+  for (int k = 0; k < 3; k++) {
+    out->middle[k] = 0.5 * extent.min[k] + 0.5 * extent.max[k];
+  }
+}
+
+orb_status orb_trials_copy(const orb_trials *t, int s, int32_t size, orb_coarse_copy *out) {
+  ORB_TRY(orb_coarse_copy_create(t->ctx, t->mesh[s], size, out));
+  for (size_t i = 0; i < 3 * (size_t)out->mesh.vertex_count; i++) {
+    out->mesh.positions[i] = (out->mesh.positions[i] - t->scaling[s].middle[i % 3]) * t->scaling[s].scale;
+  }
+  return ORB_OK;
+}
+
+orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, orb_trials *t) {
+  t->ctx = ctx;
+  t->mesh[0] = first;
+  t->mesh[1] = second;
+  for (int s = 0; s < 2; s++) {
+    scaling_of(t->mesh[s], &t->scaling[s]);
+    ORB_TRY(orb_trials_copy(t, s, ORB_FIND_COARSE, &t->copy[s]));
+  }
+  return ORB_OK;
+}
+
+void orb_trial_pose_free(orb_context *ctx, orb_elastic_pose *pose) {
+  orb_free(ctx, pose->position);
+  orb_free(ctx, pose->rotation);
+  memset(pose, 0, sizeof *pose);
+}
+
+orb_status orb_trial_pose_create(orb_context *ctx, const orb_mesh *mesh, orb_elastic_pose *out) {
+  out->position = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
+  out->rotation = ORB_NEW(ctx, double, 9 * (size_t)mesh->vertex_count);
+  return out->position && out->rotation ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+/* Poses of a trial, both of its maps in both directions. */
+static orb_status add_trial(orb_trials *t, const int32_t *forth, const int32_t *back) {
+  orb_trial *one = &t->trial[t->count++];
+  one->map[0] = (orb_rough_map){forth, back};
+  one->map[1] = (orb_rough_map){back, forth};
+  for (int s = 0; s < 2; s++) {
+    ORB_TRY(orb_trial_pose_create(t->ctx, &t->copy[s].mesh, &one->pose[s]));
+  }
+  return ORB_OK;
+}
+
+static orb_status add_spectral(orb_trials *t) {
+  orb_spectral_list list;
+  ORB_TRY(orb_spectral_find_dense(t->ctx, &t->copy[0].mesh, &t->copy[1].mesh, ORB_FIND_SPECTRAL, &list, &t->dense));
+  for (int32_t i = 0; i < list.count && i < ORB_FIND_SPECTRAL; i++) {
+    if (list.candidate[i].cost <= list.candidate[0].cost + ORB_FIND_SPECTRAL_BEHIND) {
+      ORB_TRY(add_trial(t, t->dense.forth + (size_t)i * (size_t)t->copy[0].mesh.vertex_count,
+                        t->dense.back + (size_t)i * (size_t)t->copy[1].mesh.vertex_count));
+    }
+  }
+  return ORB_OK;
+}
+
+/* Where each vertex of copy s goes if the sphere of copy 1 is rotated, as vertices of the other copy. */
+static orb_status rotated_map(const orb_trials *t, int s, const double rotation[9], int32_t *out) {
+  const orb_coarse_copy *from = &t->copy[s], *to = &t->copy[1 - s];
+  double r[9];
+  orb_locator *locator;
+  for (int k = 0; k < 9; k++) {
+    r[k] = s ? rotation[k] : rotation[3 * (k % 3) + k / 3];
+  }
+  ORB_TRY(orb_locator_create(t->ctx, to->points, to->mesh.vertex_count, to->mesh.triangles, to->mesh.triangle_count,
+                             NULL, &locator));
+  for (int32_t v = 0; v < from->mesh.vertex_count; v++) {
+    double p[3];
+    orb_place place;
+    orb_rotate_point(r, from->points + 3 * (size_t)v, p);
+    orb_locate(locator, p, -1, &place);
+    out[v] = orb_map_nearest_corner(to->mesh.triangles, &place);
+  }
+  orb_locator_destroy(t->ctx, locator);
+  return ORB_OK;
+}
+
+static orb_status add_rotations(orb_trials *t) {
+  orb_aligned_shape shape[2];
+  double rotation[9 * ORB_FIND_ROTATIONS];
+  int32_t count;
+  memset(shape, 0, sizeof shape);
+  for (int s = 0; s < 2; s++) {
+    shape[s].mesh = t->copy[s].mesh;
+    shape[s].points = t->copy[s].points;
+    t->rotated[s] = ORB_NEW(t->ctx, int32_t, ORB_FIND_ROTATIONS * (size_t)t->copy[s].mesh.vertex_count);
+    if (!t->rotated[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+  }
+  ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ORB_FIND_ROTATIONS, rotation, &count));
+  for (int32_t i = 0; i < count; i++) {
+    int32_t *map[2];
+    for (int s = 0; s < 2; s++) {
+      map[s] = t->rotated[s] + (size_t)i * (size_t)t->copy[s].mesh.vertex_count;
+      ORB_TRY(rotated_map(t, s, rotation + 9 * (size_t)i, map[s]));
+    }
+    ORB_TRY(add_trial(t, map[0], map[1]));
+  }
+  return ORB_OK;
+}
+
+orb_status orb_trials_make(orb_trials *t) {
+  ORB_TRY(add_spectral(t));
+  return add_rotations(t);
+}
+
+static void register_tasks(void *arg, int64_t begin, int64_t end, int thread) {
+  orb_trials *t = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    orb_trial *one = &t->trial[t->task[i] / 2];
+    int s = t->task[i] % 2;
+    t->status[i] = orb_elastic_register(t->ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &one->map[s], NULL,
+                                        &one->pose[s], &one->bend[s]);
+  }
+}
+
+/* Registers the trials that are not dropped in one direction, side by side. */
+static orb_status register_all(orb_trials *t, int direction) {
+  int32_t count = 0;
+  for (int32_t i = 0; i < t->count; i++) {
+    if (t->trial[i].cost < INFINITY) {
+      t->task[count++] = 2 * i + direction;
+    }
+  }
+  ORB_TRY(orb_context_check(t->ctx));
+  orb_parallel_for(t->ctx, count, 1, register_tasks, t);
+  for (int32_t i = 0; i < count; i++) {
+    if (t->status[i] != ORB_OK) {
+      return t->status[i];
+    }
+  }
+  return orb_context_check(t->ctx);
+}
+
+/* The angle of the rotation that carries copy s best onto its pose, over π. */
+static double rotation_of(const orb_trials *t, const orb_trial *one, int s) {
+  const orb_mesh *mesh = &t->copy[s].mesh;
+  const double *x = mesh->positions, *y = one->pose[s].position;
+  double mean[2][3] = {{0}}, h[9] = {0}, r[9];
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    for (int k = 0; k < 3; k++) {
+      mean[0][k] += x[3 * (size_t)v + (size_t)k] / mesh->vertex_count;
+      mean[1][k] += y[3 * (size_t)v + (size_t)k] / mesh->vertex_count;
+    }
+  }
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    double p[3], q[3];
+    orb_sub(x + 3 * (size_t)v, mean[0], p);
+    orb_sub(y + 3 * (size_t)v, mean[1], q);
+    orb_add_outer(h, q, p, 1);
+  }
+  (void)orb_nearest_rotation(h, r);
+  return acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
+}
+
+static void fill_cost(const orb_trials *t, orb_trial *one, int directions) {
+  double bend = 0;
+  for (int s = 0; s < directions; s++) {
+    bend += one->bend[s] / directions;
+  }
+  one->cost = bend * (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0));
+}
+
+int32_t orb_trials_best(const orb_trials *t) {
+  int32_t best = 0;
+  for (int32_t i = 1; i < t->count; i++) {
+    best = t->trial[i].cost < t->trial[best].cost ? i : best;
+  }
+  return best;
+}
+
+/* Drops the trials whose pose s takes the landmarks elsewhere. */
+static void drop_against_hint(orb_trials *t, int s) {
+  for (int32_t i = 0; i < t->count; i++) {
+    orb_trial *one = &t->trial[i];
+    if (one->cost < INFINITY && orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) > ORB_FIND_HINT_OFF) {
+      one->cost = one->rough = INFINITY;
+    }
+  }
+}
+
+/* Does the first pose of a trial take the landmarks to their partners? */
+static int any_agrees(const orb_trials *t) {
+  int any = 0;
+  for (int32_t i = 0; i < t->count; i++) {
+    any |= orb_hint_off(&t->hint, &t->copy[0], 0, t->trial[i].pose[0].position) <= ORB_FIND_HINT_OFF;
+  }
+  return any;
+}
+
+/* Costs of the trials that are not dropped, by these directions. */
+static void fill_costs(orb_trials *t, int directions) {
+  for (int32_t i = 0; i < t->count; i++) {
+    if (t->trial[i].cost < INFINITY) {
+      fill_cost(t, &t->trial[i], directions);
+    }
+  }
+}
+
+orb_status orb_trials_rank(orb_trials *t) {
+  ORB_TRY(register_all(t, 0));
+  const int agrees = any_agrees(t);
+  if (agrees) {
+    drop_against_hint(t, 0);
+  }
+  fill_costs(t, 1);
+  const double most = ORB_FIND_BEHIND * t->trial[orb_trials_best(t)].cost;
+  for (int32_t i = 0; i < t->count; i++) {
+    orb_trial *one = &t->trial[i];
+    one->rough = one->cost < INFINITY ? one->cost : one->rough;
+    one->cost = one->cost > most ? INFINITY : one->cost;
+  }
+  ORB_TRY(register_all(t, 1));
+  fill_costs(t, 2);
+  if (!agrees) {
+    drop_against_hint(t, 1);
+  }
+  return ORB_OK;
+}
+
+/* The mean distance between the images of the first copy's vertices under two trials, in diagonals. */
+static double difference(const orb_trials *t, const orb_trial *x, const orb_trial *y) {
+  int32_t n = t->copy[0].mesh.vertex_count;
+  orb_extent extent;
+  double sum = 0;
+  orb_mesh_extent(&t->copy[1].mesh, &extent);
+  for (int32_t v = 0; v < n; v++) {
+    sum += sqrt(orb_distance2(x->pose[0].position + 3 * (size_t)v, y->pose[0].position + 3 * (size_t)v)) / n;
+  }
+  return sum / extent.diagonal;
+}
+
+/* Whether a trial takes the first copy elsewhere than all trials of the list. */
+static int is_different(const orb_trials *t, const orb_trial *one, const int32_t *list, int32_t count) {
+  for (int32_t i = 0; i < count; i++) {
+    if (!(difference(t, one, &t->trial[list[i]]) > ORB_FIND_DIFFERENT)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* Dropped trials come last, by their rough cost. */
+static int is_before(const orb_trial *x, const orb_trial *y) {
+  return x->cost < INFINITY || y->cost < INFINITY ? x->cost < y->cost : x->rough < y->rough;
+}
+
+void orb_trials_list(orb_trials *t) {
+  t->list[0] = orb_trials_best(t);
+  t->listed = 1;
+  while (t->listed < ORB_TRIALS_LISTED) {
+    int32_t next = -1;
+    for (int32_t i = 0; i < t->count; i++) {
+      if ((next < 0 || is_before(&t->trial[i], &t->trial[next])) && is_different(t, &t->trial[i], t->list, t->listed)) {
+        next = i;
+      }
+    }
+    if (next < 0) {
+      break;
+    }
+    t->list[t->listed++] = next;
+  }
+}
+
+orb_status orb_trials_complete(orb_trials *t, int32_t number) {
+  t->task[0] = 2 * number + 1;
+  register_tasks(t, 0, 1, 0);
+  ORB_TRY(t->status[0]);
+  fill_cost(t, &t->trial[number], 2);
+  return ORB_OK;
+}
+
+void orb_trials_close(orb_trials *t) {
+  for (int32_t i = 0; i < t->count; i++) {
+    orb_trial_pose_free(t->ctx, &t->trial[i].pose[0]);
+    orb_trial_pose_free(t->ctx, &t->trial[i].pose[1]);
+  }
+  for (int s = 0; s < 2; s++) {
+    orb_coarse_copy_free(t->ctx, &t->copy[s]);
+    orb_free(t->ctx, t->rotated[s]);
+  }
+  orb_hint_places_free(t->ctx, &t->hint);
+  orb_free(t->ctx, t->dense.forth);
+  orb_free(t->ctx, t->dense.back);
+}

@@ -1,0 +1,78 @@
+/* Trials: rough maps between decimated copies of two shapes, registered and ranked by how much they bend the copies.
+ *
+ * In: two meshes, and perhaps places of landmarks on their copies. Out: the trials with their poses and costs, and the
+ * best of those that differ. match.h describes the method and writes the result. */
+#ifndef ORB_ALIGN_FIND_TRIALS_H
+#define ORB_ALIGN_FIND_TRIALS_H
+
+#include "align/find/hint.h"
+#include "align/find/params.h"
+#include "spectral/spectral.h"
+
+enum {
+  ORB_TRIALS_MAX = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS,
+  ORB_TRIALS_LISTED = 5 /* trials that are listed at most: the best one, and others that differ */
+};
+
+/* A rough map and what registering along it has given. Pose s is of copy s on the other one. */
+typedef struct orb_trial {
+  orb_rough_map map[2];
+  orb_elastic_pose pose[2];
+  double bend[2];
+  double rough; /* cost in the first direction alone */
+  double cost;  /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it */
+} orb_trial;
+
+/* How a shape is scaled: to area 4π, around the middle of its box. */
+typedef struct orb_trial_scaling {
+  double middle[3], scale;
+} orb_trial_scaling;
+
+typedef struct orb_trials {
+  orb_context *ctx;
+  const orb_mesh *mesh[2]; /* borrowed */
+  orb_trial_scaling scaling[2];
+  orb_coarse_copy copy[2]; /* scaled */
+  orb_hint_places hint;    /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
+  orb_spectral_dense dense;
+  int32_t *rotated[2]; /* the maps of the rotations, one after the other, laid out as in `dense` */
+  orb_trial trial[ORB_TRIALS_MAX];
+  int32_t count;
+  int32_t list[ORB_TRIALS_LISTED]; /* see orb_trials_list() */
+  int32_t listed;
+  /* of the loop that registers */
+  int32_t task[2 * ORB_TRIALS_MAX]; /* 2 · trial + direction */
+  orb_status status[2 * ORB_TRIALS_MAX];
+} orb_trials;
+
+/* Scales the shapes and makes their copies. Zero the struct before; free it in any case. */
+ORB_MUST_CHECK orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
+                                          orb_trials *trials);
+void orb_trials_close(orb_trials *trials);
+
+/* A decimated copy of shape s, scaled like it. The caller frees it. */
+ORB_MUST_CHECK orb_status orb_trials_copy(const orb_trials *trials, int s, int32_t size, orb_coarse_copy *out);
+
+/* Makes the trials: spectral maps and rotations of the spheres. */
+ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);
+
+/* Registers all trials in one direction, drops those that are too far behind to win, and registers the others in the
+ * other direction. Trials that take the landmarks elsewhere are dropped after the first direction. If all do, they are
+ * dropped after the second one instead: arms that lie against a body are registered to it in one direction, but
+ * correctly in the other. */
+ORB_MUST_CHECK orb_status orb_trials_rank(orb_trials *trials);
+
+/* The number of the trial of least cost. */
+int32_t orb_trials_best(const orb_trials *trials);
+
+/* Fills list: the best trial and, in order, those that differ from it and from each other. */
+void orb_trials_list(orb_trials *trials);
+
+/* Registers trial `number` in the second direction, and sets its cost by both. */
+ORB_MUST_CHECK orb_status orb_trials_complete(orb_trials *trials, int32_t number);
+
+/* Room for a pose of a mesh; free it in any case. */
+ORB_MUST_CHECK orb_status orb_trial_pose_create(orb_context *ctx, const orb_mesh *mesh, orb_elastic_pose *out);
+void orb_trial_pose_free(orb_context *ctx, orb_elastic_pose *pose);
+
+#endif
