@@ -303,9 +303,10 @@ static orb_status improve_by_walk(orb_context *ctx, orb_preset preset, orb_align
   return ORB_OK;
 }
 
-/* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a match
- * may lead to a better one, even if the landmarks show one body less clearly. All other starts are for shapes for which
- * neither works. *posed: whether `other` holds a posed alignment. The function clears it: it keeps the better one. */
+/* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a
+ * match may lead to a better one, even if the landmarks show one body less clearly. All other starts are for shapes for
+ * which neither works. *posed: whether `other` holds a posed alignment. The function clears it: it keeps the better
+ * one. */
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                           const orb_align_options *options, orb_alignment *other, int *posed, orb_alignment *a) {
   const orb_map_params params = orb_map_params_of(options->preset);

@@ -80,6 +80,10 @@ static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0
 /* If a rough map takes the landmarks farther from their partners than this mean distance, it is another map. In radii
  * of a ball of the shape's area. */
 static const double ORB_FIND_HINT_OFF = 0.5;
+/* Nor is a map registered that takes them so many times as far as the best one, and farther than that distance. Of five
+ * pairs of people, all maps that came near the partners had 0.16 to 0.5 before, the best one 0.16 to 0.3, and others up
+ * to 3. */
+static const double ORB_FIND_HINT_ROUGH = 2;
 
 /* If landmarks bend a pose more than this many times as much as it bends without them, they have twisted it. In 77
  * comparisons of people, with 8 and 24 landmarks, they bent it 0.7 to 1.4 times as much, or 6.6 times and more. */

@@ -208,7 +208,8 @@ static void drop_against_hint(orb_trials *t, int s) {
 static int any_agrees(const orb_trials *t) {
   int any = 0;
   for (int32_t i = 0; i < t->count; i++) {
-    any |= orb_hint_off(&t->hint, &t->copy[0], 0, t->trial[i].pose[0].position) <= ORB_FIND_HINT_OFF;
+    any |= t->trial[i].cost < INFINITY &&
+           orb_hint_off(&t->hint, &t->copy[0], 0, t->trial[i].pose[0].position) <= ORB_FIND_HINT_OFF;
   }
   return any;
 }
@@ -222,7 +223,33 @@ static void fill_costs(orb_trials *t, int directions) {
   }
 }
 
+/* How far a rough map takes the landmarks of copy s from their partners, in the mean. */
+static double rough_off(const orb_trials *t, const orb_trial *one, int s) {
+  double sum = 0;
+  for (int32_t i = 0; i < t->hint.few; i++) {
+    const int32_t image = one->map[s].forth[t->hint.vertex[s][i]];
+    sum += sqrt(orb_distance2(t->copy[1 - s].mesh.positions + 3 * (size_t)image, t->hint.at[1 - s] + 3 * (size_t)i));
+  }
+  return t->hint.few > 0 ? sum / t->hint.few : 0;
+}
+
+/* Drops the trials whose rough maps take the landmarks far from their partners both ways, compared with the best of
+ * them: registering brings them nearer by less. */
+static void drop_far_from_hint(orb_trials *t) {
+  double off[ORB_TRIALS_MAX], least = INFINITY;
+  for (int32_t i = 0; i < t->count; i++) {
+    off[i] = fmin(rough_off(t, &t->trial[i], 0), rough_off(t, &t->trial[i], 1));
+    least = fmin(least, off[i]);
+  }
+  for (int32_t i = 0; i < t->count; i++) {
+    if (off[i] > fmax(ORB_FIND_HINT_OFF, ORB_FIND_HINT_ROUGH * least)) {
+      t->trial[i].cost = t->trial[i].rough = INFINITY;
+    }
+  }
+}
+
 orb_status orb_trials_rank(orb_trials *t) {
+  drop_far_from_hint(t);
   ORB_TRY(register_all(t, 0));
   const int agrees = any_agrees(t);
   if (agrees) {
@@ -276,7 +303,8 @@ void orb_trials_list(orb_trials *t) {
   while (t->listed < ORB_TRIALS_LISTED) {
     int32_t next = -1;
     for (int32_t i = 0; i < t->count; i++) {
-      if ((next < 0 || is_before(&t->trial[i], &t->trial[next])) && is_different(t, &t->trial[i], t->list, t->listed)) {
+      if (t->trial[i].rough < INFINITY && (next < 0 || is_before(&t->trial[i], &t->trial[next])) &&
+          is_different(t, &t->trial[i], t->list, t->listed)) {
         next = i;
       }
     }

@@ -65,7 +65,8 @@ ORB_MUST_CHECK orb_status orb_trials_rank(orb_trials *trials);
 /* The number of the trial of least cost. */
 int32_t orb_trials_best(const orb_trials *trials);
 
-/* Fills list: the best trial and, in order, those that differ from it and from each other. */
+/* Fills list: the best trial and, in order, those that differ from it and from each other and that no landmarks
+ * contradict. */
 void orb_trials_list(orb_trials *trials);
 
 /* Registers trial `number` in the second direction, and sets its cost by both. */
