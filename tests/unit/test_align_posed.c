@@ -167,23 +167,21 @@ static void generate(orb_context *ctx, const char *kind, const char *pose, unsig
   embed(ctx, out);
 }
 
-/* The samples that both bodies have, spread over the list: its first ones are one each FEW-th part of it. */
+/* The samples that both bodies have, in their order. */
 static void keep_common(const posed_place *place[2], int samples, body bodies[2]) {
-  const int part = samples / FEW;
   bodies[0].count = bodies[1].count = 0;
   for (int i = 0; i < samples && bodies[0].count < TRUE_PLACES; i++) {
-    const int sample = i % FEW * part + i / FEW;
-    if (i / FEW < part && place[0][sample].triangle >= 0 && place[1][sample].triangle >= 0) {
+    if (place[0][i].triangle >= 0 && place[1][i].triangle >= 0) {
       for (int s = 0; s < 2; s++) {
         orb_place *one = &bodies[s].truth[bodies[s].count++];
-        one->triangle = place[s][sample].triangle;
-        memcpy(one->at, place[s][sample].at, sizeof one->at);
+        one->triangle = place[s][i].triangle;
+        memcpy(one->at, place[s][i].at, sizeof one->at);
       }
     }
   }
 }
 
-/* A giraffe stands and runs. Walks with 8 true landmarks had three times the error of the match without any. */
+/* A giraffe stands and runs. A walk with these landmarks has 1.6 times the error of the match without any. */
 static void few_true_landmarks_do_not_spoil_a_match(void **state) {
   (void)state;
   const int samples = posed_sample_count();
@@ -218,6 +216,7 @@ static void few_true_landmarks_do_not_spoil_a_match(void **state) {
     error[given] = mean_error(ctx, bodies, FEW, &out);
     orb_alignment_free(ctx, &out);
   }
+  print_message("error without landmarks %.4f, with %d of them %.4f\n", error[0], FEW, error[1]);
   assert_true(error[0] <= 0.015);
   assert_true(error[1] <= 1.05 * error[0]);
   free(place[0]);
