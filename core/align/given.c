@@ -335,9 +335,9 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const
   return ORB_OK;
 }
 
-/* Aligns by landmarks. Where these show one body in two poses, a match comes first: it knows the surface between the
- * landmarks, and where its map is good, nothing is pinned. With 8 true landmarks, walks of 35 pairs of animals of one
- * kind have up to three times the error that matches have without any. */
+/* Aligns by landmarks. If they show one body in two poses, a match comes first: it knows the surface between the
+ * landmarks, and if its map is good, nothing is pinned. For 35 pairs of animals of one kind, landmark walks with 8 true
+ * landmarks have up to three times the error of matches without any. */
 static orb_status align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                      const orb_landmark *landmarks, int32_t landmark_count,
                                      const orb_align_options *options, orb_alignment *out) {

@@ -136,7 +136,7 @@ static void fill_boxes(const float *column, orb_searched *out, int coordinate) {
   }
 }
 
-/* The boxes around the rows of boxes, of one coordinate. */
+/* Fits a box around each row of boxes, in one coordinate. */
 static void fill_whole(orb_searched *out, int coordinate) {
   const float *least = out->box + (size_t)coordinate * (size_t)out->boxes;
   const float *greatest = least + COORDINATES * (size_t)out->boxes;
@@ -233,7 +233,7 @@ static int nearest_box(const row_distances *d) {
   return nearest;
 }
 
-/* The squared distance of a row, as of its boxes: no vertex in it is nearer. */
+/* The squared distance to the box around a row of boxes. No vertex in the row is nearer. */
 static float distance_of_row(const orb_searched *s, int32_t row, const float q[COORDINATES]) {
   const int32_t rows = s->boxes / ROW;
   float sum = 0;

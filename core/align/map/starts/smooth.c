@@ -27,7 +27,7 @@ typedef struct smoothing {
   double *trust;     /* 0 to 1 */
   double *smooth;    /* likewise: 0 for outliers, else how long a vertex has been without flips */
   double *point;     /* 4 per vertex, the last unused: where it is now */
-  int32_t *row;      /* of the i-th vertex of by_colour: its first edge */
+  int32_t *row;      /* the first edge of the i-th vertex of by_colour */
   smooth_edge *edge; /* to the neighbours, in that order */
 } smoothing;
 
@@ -40,7 +40,8 @@ static double bounded(const smoothing *s, double cotangent) {
   return fmin(fmax(cotangent, s->params->smooth.least_cotangent), s->params->smooth.most_cotangent);
 }
 
-/* Each neighbour is in two spokes, as q of one and r of the other. */
+/* Fills in the edges from v and returns their number. Each neighbour belongs to two spokes, as q of one and as r of the
+ * other. */
 static int32_t fill_row(const smoothing *s, int32_t v, smooth_edge *out) {
   const orb_map_level *l = s->level;
   int32_t count = 0;
@@ -72,7 +73,7 @@ static void fill_edges(const smoothing *s) {
   s->row[moving_count(l)] = count;
 }
 
-/* The i-th vertex of by_colour to the mean of its target and its neighbours. */
+/* Moves the i-th vertex of by_colour to the mean of its target and its neighbours. */
 static void relax(const smoothing *s, int32_t i) {
   const orb_map_level *l = s->level;
   const int32_t v = l->by_colour[i];
