@@ -144,8 +144,20 @@ static int claim_next(database *db, void *arg) {
                         : code;
 }
 
+/* Looks without a transaction, for which all nodes would wait. */
+static int may_find(catalogue *cat, const claim_wish *wish) {
+  char id[API_JOB_ID_SIZE];
+  database *db = catalogue_reader(cat);
+  int code = pick_one(db, wish, id);
+  catalogue_reader_done(cat, db);
+  return code != SQL_NOTFOUND;
+}
+
 store_result catalogue_claim_next(catalogue *cat, const claim_wish *wish, job_claim *out) {
   memset(out, 0, sizeof *out);
+  if ((wish->guest || wish->fetches) && !may_find(cat, wish)) { /* as usual */
+    return STORE_NOT_FOUND;
+  }
   store_result result = catalogue_write(cat, claim_next, &(claim_arg){wish, out});
   if (result != STORE_OK) {
     job_row_free(&out->row);
