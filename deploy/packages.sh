@@ -14,6 +14,9 @@ orb_long_packages=(
   pgbouncer valgrind wrk blender python3-numpy caddy debootstrap lintian buildah podman runc prometheus systemd
 )
 
+# For tests/long.sh cluster on a second S3 server, where there are such packages.
+orb_radosgw_packages=(radosgw ceph-osd ceph-mon)
+
 # Installs those of its arguments that are missing, as root or through sudo; never asks.
 orb_install_packages() {
   local package missing=() as_root=()

@@ -94,23 +94,33 @@ part_migrate() {
   ORBMORPHD="$PWD/build/bin/orbmorphd" tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/long/migrate.mjs
 }
 
-# The scenarios on three nodes behind haproxy, with PostgreSQL and S3; those of jobs and tenants also with PostgreSQL and
-# files. Then several nodes which are killed, paused and cut off, by turns.
+# The scenarios on three nodes behind haproxy, with PostgreSQL and S3: OpenStack Swift, then Ceph's radosgw where it can be
+# installed (ORB_S3_SERVERS names fewer). Those of jobs and tenants also with PostgreSQL and files. Then several nodes
+# which are killed, paused and cut off, by turns.
 part_cluster() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
   cmake --build build --target orbmorphd orbmorph
   local name
-  for name in meshes jobs supermeshes tenants eviction resume fairness embeddings lists landmarks conditions; do
-    echo "three nodes: $name"
-    ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh tests/tools/with_s3.sh tests/tools/with_nodes.sh \
-      node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
-  done
+  local -x ORB_S3_SERVER ORBMORPHD=$PWD/build/bin/orbmorphd
   for name in jobs tenants; do
-    ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh \
-      node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
+    tests/tools/with_postgresql.sh node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
   done
-  ORB_ROUNDS=${ORB_ROUNDS:-500} ORBMORPHD=$PWD/build/bin/orbmorphd tests/tools/with_postgresql.sh tests/tools/with_s3.sh \
-    node --test --test-reporter=spec tests/scenario/nodes.test.mjs
+  for ORB_S3_SERVER in ${ORB_S3_SERVERS:-swift radosgw}; do
+    if [ "$ORB_S3_SERVER" = radosgw ] && ! orb_install_packages "${orb_radosgw_packages[@]}"; then
+      echo "radosgw: skipped, its packages cannot be installed"
+      continue
+    fi
+    for name in ${ORB_CLUSTER_SCENARIOS-meshes jobs supermeshes tenants eviction resume fairness embeddings lists landmarks conditions}; do
+      echo "$ORB_S3_SERVER, three nodes: $name"
+      tests/tools/with_postgresql.sh tests/tools/with_s3.sh tests/tools/with_nodes.sh \
+        node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
+    done
+    for name in s3 migrate nodes; do
+      echo "$ORB_S3_SERVER: $name"
+      ORB_ROUNDS=${ORB_ROUNDS:-500} tests/tools/with_postgresql.sh tests/tools/with_s3.sh \
+        node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
+    done
+  done
 }
 
 # The same nodes, with pgbouncer before PostgreSQL.

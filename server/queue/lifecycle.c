@@ -14,7 +14,7 @@ static void memory_freed(void *user) {
   queue *q = user;
   pthread_mutex_lock(&q->lock);
   if (q->shared) {
-    shared_look(q);
+    shared_look(q, 1);
   }
   wake_workers(q);
   pthread_mutex_unlock(&q->lock);

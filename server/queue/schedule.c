@@ -186,6 +186,7 @@ void schedule_leave(queue *q, job *j) {
     budget_give(q->options.memory, j->is_guest ? BUDGET_SMALL : BUDGET_JOBS, j->memory, q);
   }
   j->memory = 0;
+  const int frees_fetches = fetches(j) || (q->exclusive && !j->is_guest);
   q->exclusive = q->exclusive && j->is_guest;
   j->taken_at = 0;
   j->charged = 0;
@@ -195,7 +196,7 @@ void schedule_leave(queue *q, job *j) {
   j->ctx = NULL;
   j->ready = unix_ms();
   if (q->shared) {
-    shared_look(q);
+    shared_look(q, frees_fetches);
   }
   wake_workers(q);
 }

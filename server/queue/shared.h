@@ -36,8 +36,8 @@ int shared_take(queue *q, queue_lane lane, job **out, int *threads);
 queue_result shared_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const char *const *requests,
                              const int64_t *costs, int count);
 
-/* Under the lock: there may be jobs to claim; numbers over all nodes. */
-void shared_look(queue *q);
+/* Under the lock: there may be jobs to claim, also downloads if fetches; numbers over all nodes. */
+void shared_look(queue *q, int fetches);
 void shared_count(const queue *q, int64_t now, queue_numbers *out);
 /* This node claims nothing for this long. */
 void shared_hold(queue *q, int64_t ms);

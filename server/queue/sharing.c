@@ -13,9 +13,9 @@
 
 enum { TICK_MS = 1000, AWAY_MS = 200, PAUSE_MS = 250, RENEWALS = 3 /* in the time of a lease */ };
 
-void shared_look(queue *q) {
+void shared_look(queue *q, int fetches) {
   for (int lane = 0; lane < LANES; lane++) {
-    q->shared->look[lane] = 1;
+    q->shared->look[lane] |= lane != QUEUE_FETCHES || fetches;
   }
 }
 
@@ -121,8 +121,11 @@ static void *thread_main(void *argument) {
     if (connected && (fresh || now - renewed >= s->options.lease_ms / RENEWALS) && renew(q)) {
       renewed = now;
     }
-    __atomic_store_n(&s->house, connected && notices_does_housekeeping(s->bell), __ATOMIC_RELEASE);
-    if (connected && (fresh || now - looked >= TICK_MS)) {
+    const int looks = connected && (fresh || now - looked >= TICK_MS);
+    if (looks || !connected) {
+      __atomic_store_n(&s->house, connected && notices_does_housekeeping(s->bell), __ATOMIC_RELEASE);
+    }
+    if (looks) {
       looked = now;
       look_around(q);
     }

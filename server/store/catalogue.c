@@ -20,6 +20,9 @@ enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node or
 /* How long events and times of use wait for a write whose caller waits. Their own commit, with its fdatasync(), costs
  * more than all else that a small job writes. The end of such a job takes its events along. */
 enum { GATHER_MS = 20 };
+/* The same among several nodes, whose transactions wait for one another. Events of jobs on other nodes come that much
+ * later. */
+enum { GATHER_SHARED_MS = 100 };
 
 /* A waiting write. catalogue_write() keeps it on its caller's stack. */
 typedef struct pending {
@@ -69,21 +72,43 @@ static int begin(const catalogue *cat, database *db) {
   return database_execute(db, cat->shared ? sql : database_either(db, "BEGIN IMMEDIATE", "BEGIN"));
 }
 
-/* Runs a batch in one transaction. A write that fails is rolled back alone; if the commit fails, all writes fail. */
-static int run_batch(catalogue *cat, pending *batch) {
+/* One write of a batch. */
+static int run_one(database *db, pending *p) {
+  p->code = object_lock_check(db, p->number);
+  p->code = p->code == SQL_OK ? p->fn(db, p->arg) : p->code;
+  return p->code;
+}
+
+/* Runs a batch in one transaction without savepoints: a single write, or writes to a database on another machine, where
+ * savepoints would cost as many requests as a small write itself while other nodes wait. If one of several writes
+ * fails, nothing is written, and *again is 1. */
+static int run_plain(catalogue *cat, pending *batch, int *again) {
   database *db = &cat->writer;
-  FAULT_POINT("before-begin");
-  /* A previous transaction may still be open if its rollback failed. */
-  int code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : SQL_OK;
-  code = code == SQL_OK ? begin(cat, db) : code;
+  int code = begin(cat, db);
+  for (pending *p = batch; p && code == SQL_OK; p = p->next) {
+    if (run_one(db, p) == SQL_OK) {
+      continue;
+    }
+    code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : p->code;
+    *again = code == SQL_OK && batch->next != NULL;
+    if (code == SQL_OK) {
+      return SQL_OK;
+    }
+  }
+  FAULT_POINT("before-commit");
+  return code == SQL_OK ? database_execute(db, "COMMIT") : code;
+}
+
+/* The same with savepoints: a write that fails is rolled back alone. */
+static int run_careful(catalogue *cat, pending *batch) {
+  database *db = &cat->writer;
+  int code = begin(cat, db);
   for (pending *p = batch; p && code == SQL_OK; p = p->next) {
     if (database_execute(db, "SAVEPOINT one") != SQL_OK) {
       code = SQL_IOERR;
       break;
     }
-    p->code = object_lock_check(db, p->number);
-    p->code = p->code == SQL_OK ? p->fn(db, p->arg) : p->code;
-    if (p->code != SQL_OK) {
+    if (run_one(db, p) != SQL_OK) {
       database_execute(db, "ROLLBACK TO one");
     }
     /* A full disk or an input/output error may have rolled back everything already. */
@@ -94,8 +119,22 @@ static int run_batch(catalogue *cat, pending *batch) {
     }
   }
   FAULT_POINT("before-commit");
-  if (code == SQL_OK) {
-    code = database_execute(db, "COMMIT");
+  return code == SQL_OK ? database_execute(db, "COMMIT") : code;
+}
+
+/* Runs a batch. A write that fails changes nothing, and the others are written; if the commit fails, all writes fail.
+ */
+static int run_batch(catalogue *cat, pending *batch) {
+  database *db = &cat->writer;
+  FAULT_POINT("before-begin");
+  /* A previous transaction may still be open if its rollback failed. */
+  int code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : SQL_OK;
+  int careful = !cat->shared && batch->next;
+  if (code == SQL_OK && !careful) {
+    code = run_plain(cat, batch, &careful);
+  }
+  if (code == SQL_OK && careful) {
+    code = run_careful(cat, batch);
   }
   FAULT_POINT("after-commit");
   if (code != SQL_OK) {
@@ -114,8 +153,8 @@ static pending *wait_for_batch(catalogue *cat) {
   while (!cat->first && !cat->stopping) {
     pthread_cond_wait(&cat->wake, &cat->lock);
   }
-  const int64_t until = orb_clock_ms() + GATHER_MS;
-  for (int64_t left = GATHER_MS; cat->first && !cat->urgent && !cat->stopping && left > 0;) {
+  const int64_t most = cat->shared ? GATHER_SHARED_MS : GATHER_MS, until = orb_clock_ms() + most;
+  for (int64_t left = most; cat->first && !cat->urgent && !cat->stopping && left > 0;) {
     wake_wait_ms(&cat->wake, &cat->lock, left);
     left = until - orb_clock_ms();
   }
@@ -195,7 +234,7 @@ void catalogue_write_later(catalogue *cat, write_fn fn, void *arg) {
 }
 
 void catalogue_write_gathered(catalogue *cat, write_fn fn, void *arg) {
-  write_later(cat, fn, arg, cat->shared); /* other nodes wait for events */
+  write_later(cat, fn, arg, 0);
 }
 
 database *catalogue_reader(catalogue *cat) {

@@ -49,11 +49,12 @@ static const char pick_computing[] =
          FIRST("kind<>2") " UNION ALL " SMALLEST("kind<>2") " LIMIT 1");
 static const char pick_fetching[] = PICK("true", FIRST("kind=2"));
 
-/* A concurrent claim skips the row if the lock of transactions did not make it wait. */
+/* Also of a job that was picked before the transaction: another node may have claimed it since, or one with its key. */
 static const char take[] =
     "UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(), alone=suspect,"
     " started=CASE WHEN started=0 AND kind<>1 THEN clock_ms() ELSE started END" /* 1: catalogue_job_begin() */
-    " WHERE id=(SELECT id FROM job WHERE id=?1 AND state=0 FOR UPDATE SKIP LOCKED LIMIT 1)";
+    " WHERE id=(SELECT id FROM job WHERE id=?1 AND state=0 AND waits=0 FOR UPDATE SKIP LOCKED LIMIT 1)"
+    " AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=job.key AND o.state=1)";
 
 /* Jobs that wait for this one are shown as running from now on. */
 static const char show_waiting[] =
@@ -62,6 +63,7 @@ static const char show_waiting[] =
 
 typedef struct claim_arg {
   const claim_wish *wish;
+  char picked[API_JOB_ID_SIZE];
   job_claim *out;
 } claim_arg;
 
@@ -125,15 +127,21 @@ static int read_claimed(database *db, const char *id, job_claim *out) {
   return code;
 }
 
+static int take_one(database *db, const claim_arg *a, const char *id) {
+  int code = run_for(db, take, id, a->wish->node);
+  return code == SQL_OK && sql_changes(db) != 1 ? SQL_NOTFOUND : code;
+}
+
 static int claim_next(database *db, void *arg) {
   const claim_arg *a = arg;
   char id[API_JOB_ID_SIZE];
   job_row_free(&a->out->row); /* of an earlier run of this write */
   memset(a->out, 0, sizeof *a->out);
-  int code = pick_one(db, a->wish, id);
-  code = code == SQL_OK ? run_for(db, take, id, a->wish->node) : code;
-  if (code == SQL_OK && sql_changes(db) != 1) {
-    return SQL_NOTFOUND;
+  memcpy(id, a->picked, sizeof id);
+  int code = take_one(db, a, id);
+  if (code == SQL_NOTFOUND) {
+    code = pick_one(db, a->wish, id);
+    code = code == SQL_OK ? take_one(db, a, id) : code;
   }
   code = code == SQL_OK ? run_for(db, show_waiting, id, NULL) : code;
   code = code == SQL_OK ? read_claimed(db, id, a->out) : code;
@@ -144,9 +152,20 @@ static int claim_next(database *db, void *arg) {
                         : code;
 }
 
+/* Picks outside of the transaction, for which all nodes wait. The query takes longer than all else in it. */
 store_result catalogue_claim_next(catalogue *cat, const claim_wish *wish, job_claim *out) {
+  claim_arg a = {.wish = wish, .out = out};
   memset(out, 0, sizeof *out);
-  store_result result = catalogue_write(cat, claim_next, &(claim_arg){wish, out});
+  database *db = catalogue_reader(cat);
+  int code = pick_one(db, wish, a.picked);
+  catalogue_reader_done(cat, db);
+  if (code == SQL_NOTFOUND) {
+    return STORE_NOT_FOUND;
+  }
+  if (code != SQL_OK) {
+    a.picked[0] = 0; /* the transaction reports it, or picks itself */
+  }
+  store_result result = catalogue_write(cat, claim_next, &a);
   if (result != STORE_OK) {
     job_row_free(&out->row);
   }

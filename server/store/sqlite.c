@@ -1,4 +1,5 @@
 /* The driver of SQLite. */
+#include <pthread.h>
 #include <sqlite3.h>
 
 #include "log.h"
@@ -45,8 +46,17 @@ static int execute(sql_connection *c, const char *sql) {
   return code_of(code);
 }
 
+/* What savepoints keep, pages of a few jobs, stays in memory: by default SQLite makes a file in /var/tmp of more than
+ * 64 KiB, which takes longer than the write of a small job itself. */
+static void keep_savepoints_in_memory(void) {
+  enum { SPILL_BYTES = 4 << 20 };
+  sqlite3_config(SQLITE_CONFIG_STMTJRNL_SPILL, SPILL_BYTES);
+}
+
 static int open_file(const char *where, int writer, sql_connection *out) {
+  static pthread_once_t once = PTHREAD_ONCE_INIT;
   sqlite3 *handle = NULL;
+  pthread_once(&once, keep_savepoints_in_memory);
   int flags = SQLITE_OPEN_NOMUTEX | (writer ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
   int code = sqlite3_open_v2(where, &handle, flags, NULL);
   *out = (sql_connection){&sql_sqlite, handle};

@@ -19,8 +19,8 @@ store_result catalogue_write_held(struct catalogue *cat, write_fn fn, void *arg)
 /* The same as catalogue_write() without waiting; frees arg with free(). */
 void catalogue_write_later(struct catalogue *cat, write_fn fn, void *arg);
 
-/* The same as catalogue_write_later(), but the write may wait up to 20 ms, to be committed with others. It does not
- * wait where other nodes share the catalogue. All writes keep their order. */
+/* The same as catalogue_write_later(), but the write may wait up to 20 ms, or 100 ms where other nodes share the
+ * catalogue, to be committed with others. All writes keep their order. */
 void catalogue_write_gathered(struct catalogue *cat, write_fn fn, void *arg);
 
 const char *catalogue_path(const struct catalogue *cat);

@@ -50,10 +50,18 @@ function held(name) {
   const first = existsSync('/sys/fs/cgroup/cgroup.controllers');
   const group = path.join(first ? '/sys/fs/cgroup' : '/sys/fs/cgroup/cpu', name);
   mkdirSync(group);
-  if (first) writeFileSync(path.join(group, 'cpu.max'), `${share * PERIOD} ${PERIOD}`);
-  else {
+  const quota = Math.round(share * PERIOD);
+  // A node that waited for a core in one period may have the rest of its share in the next: on average it gets no more.
+  // The weight is for machines that do other work besides: a node should get its share there as well.
+  if (first) {
+    writeFileSync(path.join(group, 'cpu.max'), `${quota} ${PERIOD}`);
+    writeFileSync(path.join(group, 'cpu.max.burst'), `${quota}`);
+    writeFileSync(path.join(group, 'cpu.weight'), '8000');
+  } else {
     writeFileSync(path.join(group, 'cpu.cfs_period_us'), `${PERIOD}`);
-    writeFileSync(path.join(group, 'cpu.cfs_quota_us'), `${share * PERIOD}`);
+    writeFileSync(path.join(group, 'cpu.cfs_quota_us'), `${quota}`);
+    writeFileSync(path.join(group, 'cpu.cfs_burst_us'), `${quota}`);
+    writeFileSync(path.join(group, 'cpu.shares'), '81920');
   }
   return { processes: path.join(group, 'cgroup.procs'), remove: () => rmdirSync(group) };
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs a command with an S3 server of its own, OpenStack Swift, which ends with it: with_s3.sh COMMAND…
+# Runs a command with an S3 server of its own, which ends with it: with_s3.sh COMMAND…
 #
-# The command finds in its environment
+# ORB_S3_SERVER chooses it: swift, OpenStack Swift (the default), or radosgw, Ceph's. The command finds in its environment
 #   ORB_S3         the server's URL; its keys are in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY
 #   ORB_S3_START   a program: starts the server again on the same port with the same data, and prints its process
 #   ORB_S3_PID     the server's process
@@ -9,36 +9,55 @@
 #                  for its --data
 #   ORB_DAEMON     then: that daemon itself
 set -eu
-python=/usr/bin/python3 # Debian's, which has Debian's modules
 tools=$(cd "$(dirname "$0")" && pwd)
-"$python" -c 'import swift.common, eventlet' 2>/dev/null || {
-  echo "Swift is not there: install the packages swift-proxy, swift-account, swift-container and swift-object" >&2
-  exit 77
-}
+case ${ORB_S3_SERVER:-swift} in
+  swift)
+    server_program=(/usr/bin/python3 "$tools/swift_s3.py") # Debian's Python, which has Debian's modules
+    /usr/bin/python3 -c 'import swift.common, eventlet' 2>/dev/null || {
+      echo "Swift is not there: install the packages swift-proxy, swift-account, swift-container and swift-object" >&2
+      exit 77
+    }
+    ;;
+  radosgw)
+    server_program=("$tools/radosgw.sh")
+    for program in radosgw radosgw-admin ceph ceph-mon ceph-osd monmaptool; do
+      command -v "$program" >/dev/null || {
+        echo "Ceph's radosgw is not there: install the packages radosgw, ceph-osd and ceph-mon" >&2
+        exit 77
+      }
+    done
+    ;;
+  *)
+    echo "ORB_S3_SERVER is swift or radosgw, not $ORB_S3_SERVER" >&2
+    exit 2
+    ;;
+esac
 folder=$(mktemp -d /tmp/orbmorph-s3-XXXXXX)
 server=
 finish() {
-  for pid in $server $(cat "$folder/restarted" 2>/dev/null || true); do
-    kill "$pid" 2>/dev/null || true
+  for pid in $server $(cat "$folder/restarted" "$folder/data/cluster" 2>/dev/null || true); do
+    kill -9 "$pid" 2>/dev/null || true
   done
+  wait "$server" 2>/dev/null || true
   rm -rf "$folder"
 }
 trap finish EXIT
 trap 'exit 143' TERM INT
-"$python" "$tools/swift_s3.py" "$folder/swift" >"$folder/port" 2>"$folder/log" &
+mkdir "$folder/data"
+"${server_program[@]}" "$folder/data" >"$folder/port" 2>"$folder/log" &
 server=$!
-for ((i = 0; i < 600; i++)); do
+for ((i = 0; i < 1200; i++)); do
   [ -s "$folder/port" ] && break
   kill -0 "$server" 2>/dev/null || { cat "$folder/log" >&2; exit 1; }
   sleep 0.1
 done
 port=$(head -1 "$folder/port")
-[ -n "$port" ] || { echo "Swift did not start within a minute" >&2; cat "$folder/log" >&2; exit 1; }
+[ -n "$port" ] || { echo "The S3 server did not start within two minutes" >&2; cat "$folder/log" >&2; exit 1; }
 export ORB_S3="http://127.0.0.1:$port" ORB_S3_PID=$server ORB_S3_START="$folder/start"
 export AWS_ACCESS_KEY_ID=orbmorph:daemon AWS_SECRET_ACCESS_KEY=secret-of-the-daemon
 cat >"$ORB_S3_START" <<END
 #!/usr/bin/env bash
-"$python" "$tools/swift_s3.py" "$folder/swift" "$port" >/dev/null 2>>"$folder/log" &
+${server_program[@]@Q} "$folder/data" "$port" >/dev/null 2>>"$folder/log" &
 echo \$! >>"$folder/restarted"
 echo \$!
 END

@@ -456,6 +456,25 @@ static double usual_seconds_a_byte(void) {
   return least;
 }
 
+/* What docs/limits.md states of ordinary files. The daemon reserves 9 bytes a byte for the first check. */
+static void test_ordinary_memory(void **state) {
+  (void)state;
+  text ordinary = loose_triangles(16000, 0);
+  orb_context *own;
+  orb_mesh mesh;
+  assert_int_equal(orb_context_create(&(orb_context_options){.threads = 1}, &own), ORB_OK);
+  assert_int_equal(orb_mesh_read(own, (const unsigned char *)ordinary.at, ordinary.size, ORB_FORMAT_AUTO, &mesh, NULL),
+                   ORB_OK);
+  orb_status repaired = orb_mesh_repair(own, &mesh, ORB_REPAIR_SAFE);
+  (void)repaired;
+  double peak = (double)orb_memory_peak(own) / (double)ordinary.size;
+  print_message("an ordinary file: %.1f bytes a byte\n", peak);
+  assert_true(peak > 1 && peak <= 5.5);
+  orb_mesh_free(own, &mesh);
+  orb_context_destroy(own);
+  free(ordinary.at);
+}
+
 /* docs/limits.md has these multiples. */
 static void test_multiples(void **state) {
   (void)state;
@@ -506,6 +525,7 @@ int main(void) {
       cmocka_unit_test(test_shared_indices),
       cmocka_unit_test(test_overlapping_accessors),
       cmocka_unit_test(test_many_members),
+      cmocka_unit_test(test_ordinary_memory),
       cmocka_unit_test(test_multiples),
   };
   return cmocka_run_group_tests(tests, context_one_thread, context_end);

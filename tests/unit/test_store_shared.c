@@ -209,7 +209,8 @@ static void test_lease(void **state) {
     usleep(20000);
   }
   catalogue_recover_lost(n->cat[1], 3, 7, "{}");
-  assert_int_equal(claim(n, 1, &taken), STORE_OK); /* after that write */
+  assert_int_equal(catalogue_job_cancel(n->cat[1], "none"), STORE_OK); /* waits for that write */
+  assert_int_equal(claim(n, 1, &taken), STORE_OK);
   assert_string_equal(taken.row.id, row.id);
   assert_int_equal(taken.row.attempt, 2);
   assert_int_equal(taken.row.suspect, 1);
