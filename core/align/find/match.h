@@ -57,12 +57,12 @@ typedef struct orb_match {
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
  * poses. Only maps that take the first few landmarks near their partners count; the targets then take all landmarks
- * there. Free `out` in any case. About 1 s of one thread, whatever the size. Trials run on all threads, and the result
+ * there. Free `out` in any case. About 0.6 s of one thread, whatever the size. Trials run on all threads, and the result
  * has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
 /* Computes the target of other[k], which the caller frees, also on failure. The meshes of the match must still exist.
- * About 0.4 s of one thread. */
+ * About 0.2 s of one thread. */
 ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);
 /* Makes other[k] the best map; the former best map becomes the first of the others. target: that of other[k]; the match
  * takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that decided.
