@@ -215,32 +215,65 @@ static orb_status spread_landmarks(orb_context *ctx, const double *positions, in
   return ORB_OK;
 }
 
-/* Composes the map to shape s with all landmarks pinned, towards a match that agrees with a few landmarks and takes all
- * of them to their partners. sure: as in orb_match_hint. *energy: INFINITY if there is no such match, or no such map.
- */
-static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double sure,
-                                int keeps_angles, double *energy) {
+/* The landmarks of the first shape and of shape s: first those that are exact, spread, then those that are soft.
+ * Returns the number of the exact ones. */
+static int32_t list_landmarks(const orb_landmark *landmarks, const orb_alignment *a, int32_t s, int32_t *vertex[2]) {
+  const int32_t count = a->landmark_count, exact = count - count_soft(landmarks, count);
+  int32_t next[2] = {0, exact};
+  for (int32_t l = 0; l < count; l++) {
+    const int32_t at = next[is_soft(&landmarks[l])]++;
+    vertex[0][at] = a->shapes[0].landmark_vertices[l];
+    vertex[1][at] = a->shapes[s].landmark_vertices[l];
+  }
+  return exact;
+}
+
+/* What a match has led to before anything is pinned. */
+typedef struct posed {
+  orb_alignment alignment; /* empty, unless it is found */
+  double worst;            /* the largest energy of its maps */
+  int is_found;
+  int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body */
+} posed;
+
+static void posed_free(orb_context *ctx, posed *p) {
+  orb_alignment_free(ctx, &p->alignment);
+  p->is_found = 0;
+}
+
+/* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
+ * partners, with all of them pinned. Soft landmarks exclude matches only where too few are exact. sure: as of the hint.
+ * Raises p->worst, to INFINITY if there is no such match, or no such map. */
+static orb_status compose_posed(orb_context *ctx, const orb_landmark *landmarks, int32_t s, orb_preset preset,
+                                double sure, int keeps_angles, posed *p) {
+  orb_alignment *a = &p->alignment;
   orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
-  const int32_t count = a->landmark_count, few = count < ORB_FIND_HINT_FEW ? count : ORB_FIND_HINT_FEW;
+  const int32_t count = a->landmark_count;
   int32_t *vertex[2] = {ORB_NEW(ctx, int32_t, count), ORB_NEW(ctx, int32_t, count)};
   orb_match match = {0};
-  double energies[2];
-  int improved;
+  double energies[2] = {INFINITY, INFINITY};
+  int improved = 0;
   orb_status status = vertex[0] && vertex[1] ? ORB_OK : ORB_E_NO_MEMORY;
-  *energy = INFINITY;
   if (status != ORB_OK) {
     goto done;
   }
-  memcpy(vertex[0], fixed->landmark_vertices, (size_t)count * sizeof *vertex[0]);
-  memcpy(vertex[1], moving->landmark_vertices, (size_t)count * sizeof *vertex[1]);
-  ORB_GO(status, spread_landmarks(ctx, fixed->mesh.positions, count, vertex), done);
-  const orb_match_hint hint = {count, few, vertex[0], vertex[1], ORB_FIND_HINT_STRETCH_MOST, sure};
+  const int32_t exact = list_landmarks(landmarks, a, s, vertex), spread = exact >= ORB_FIND_HINT_LEAST ? exact : count;
+  ORB_GO(status, spread_landmarks(ctx, fixed->mesh.positions, spread, vertex), done);
+  const orb_match_hint hint = {.count = count,
+                               .few = spread < ORB_FIND_HINT_FEW ? spread : ORB_FIND_HINT_FEW,
+                               .first = vertex[0],
+                               .second = vertex[1],
+                               .stretch = ORB_FIND_HINT_STRETCH_MOST,
+                               .sure = sure};
   ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match), done);
+  p->is_unsure |= match.is_unsure;
   if (match.is_found) {
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE, .target = match.target, .keeps_angles = keeps_angles};
     ORB_GO(status, orb_compose(ctx, fixed, moving, 0, count, &guide, preset, energies, &improved), done);
-    *energy = improved ? energies[1] : INFINITY;
   }
+  const double energy = improved ? energies[1] : INFINITY;
+  a->energy += energy / (a->shape_count - 1);
+  p->worst = fmax(p->worst, energy);
 done:
   orb_match_free(ctx, &match);
   orb_free(ctx, vertex[0]);
@@ -258,39 +291,48 @@ orb_status orb_align_are_alike(orb_context *ctx, orb_alignment *a, orb_preset pr
   return ORB_OK;
 }
 
-/* Aligns shapes that are one body in several poses. The map starts on spheres that keep angles, as without landmarks.
- * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
- * what lies between them. sure: as of orb_match_hint. *found 0: the landmarks do not show one body, or no map was
- * found, and `out` is empty. */
-static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                              const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                              double sure, orb_alignment *out, int *found) {
+static orb_status compose_all_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                    const orb_landmark *landmarks, int32_t landmark_count,
+                                    const orb_align_options *options, double sure, posed *p) {
   orb_align_options rotated = *options;
-  double sum = 0;
   rotated.method = ORB_ALIGN_ROTATE;
-  *found = 0;
   orb_even_shapes even = {0};
   int alike;
   orb_status status;
-  ORB_GO(status, create(ctx, shapes, shape_count, landmarks, landmark_count, &rotated, out), end);
-  ORB_GO(status, orb_align_are_alike(ctx, out, options->preset, &alike), end);
+  ORB_GO(status, create(ctx, shapes, shape_count, landmarks, landmark_count, &rotated, &p->alignment), end);
+  ORB_GO(status, orb_align_are_alike(ctx, &p->alignment, options->preset, &alike), end);
   if (!alike) {
-    orb_alignment_free(ctx, out);
+    orb_alignment_free(ctx, &p->alignment);
     ORB_GO(status, orb_even_shapes_create(ctx, shapes, shape_count, &even), end);
-    ORB_GO(status, create(ctx, even.shapes, shape_count, landmarks, landmark_count, &rotated, out), end);
+    ORB_GO(status, create(ctx, even.shapes, shape_count, landmarks, landmark_count, &rotated, &p->alignment), end);
   }
-  for (int32_t s = 1; s < shape_count && sum < INFINITY && status == ORB_OK; s++) {
-    double energy;
-    status = compose_posed(ctx, out, s, options->preset, sure, !alike, &energy);
-    sum += energy;
+  p->alignment.energy = 0;
+  for (int32_t s = 1; s < shape_count && p->worst < INFINITY && status == ORB_OK; s++) {
+    status = compose_posed(ctx, landmarks, s, options->preset, sure, !alike, p);
   }
-  *found = status == ORB_OK && sum < INFINITY;
-  out->energy = sum / (shape_count - 1);
 end:
-  if (!*found) {
-    orb_alignment_free(ctx, out);
-  }
   orb_even_shapes_free(ctx, &even);
+  return status;
+}
+
+/* Aligns shapes that are one body in several poses. The map starts on spheres that keep angles, as without landmarks.
+ * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
+ * what lies between them. sure: as of orb_match_hint. Nothing is found if the landmarks do not show one body, if there
+ * is no map, or if such a sphere has no room for a landmark: where the given one has, pins can meet. Free `out` in any
+ * case. */
+static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                              const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                              double sure, posed *out) {
+  memset(out, 0, sizeof *out);
+  orb_status status = compose_all_posed(ctx, shapes, shape_count, landmarks, landmark_count, options, sure, out);
+  out->is_found = status == ORB_OK && out->worst < INFINITY;
+  if (!out->is_found) {
+    posed_free(ctx, out);
+  }
+  if (status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED) {
+    orb_error_clear(ctx);
+    status = ORB_OK;
+  }
   return status;
 }
 
@@ -303,12 +345,18 @@ static orb_status improve_by_walk(orb_context *ctx, orb_preset preset, orb_align
   return ORB_OK;
 }
 
+static void keep_better(orb_context *ctx, orb_alignment *a, posed *p) {
+  if (p->is_found) {
+    orb_alignment_keep_better(ctx, a, &p->alignment);
+    p->is_found = 0;
+  }
+}
+
 /* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a
  * match may lead to a better one, even if the landmarks show one body less clearly. All other starts are for shapes for
- * which neither works. *posed: whether `other` holds a posed alignment. The function clears it: it keeps the better
- * one. */
+ * which neither works. p: what a match has led to before; if it was found, the better one is kept. */
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
-                          const orb_align_options *options, orb_alignment *other, int *posed, orb_alignment *a) {
+                          const orb_align_options *options, posed *p, orb_alignment *a) {
   const orb_map_params params = orb_map_params_of(options->preset);
   const double good = params.energy.good, poor = params.energy.poor;
   int walked = 0;
@@ -316,49 +364,54 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const
   if (a->shape_count == 2) {
     ORB_TRY(improve_by_walk(ctx, options->preset, a, &walked));
   }
-  if (!*posed && a->energy > poor && a->landmark_count >= ORB_FIND_HINT_LEAST) {
-    ORB_TRY(align_posed(ctx, shapes, a->shape_count, landmarks, a->landmark_count, options, ORB_FIND_HINT_STRETCH_MOST,
-                        other, posed));
+  if (p->is_unsure && !p->is_found && a->energy > poor) {
+    ORB_TRY(
+        align_posed(ctx, shapes, a->shape_count, landmarks, a->landmark_count, options, ORB_FIND_HINT_STRETCH_MOST, p));
   }
-  const int is_done = *posed ? fmin(a->energy, other->energy) <= ORB_FIND_POSED_POOR : walked || a->energy <= good;
-  if (*posed && is_done) {
-    orb_alignment_keep_better(ctx, a, other);
-    *posed = 0;
+  const int is_done = p->is_found ? fmin(a->energy, p->worst) <= ORB_FIND_POSED_POOR : walked || a->energy <= good;
+  if (is_done) {
+    keep_better(ctx, a, p);
   }
   if (options->preset == ORB_PRESET_QUALITY || !is_done) {
     ORB_TRY(orb_compose_all(ctx, a, ORB_MAP_FROM_SPACE, NULL, options->preset));
   }
-  if (*posed) {
-    orb_alignment_keep_better(ctx, a, other);
-    *posed = 0;
-  }
+  keep_better(ctx, a, p);
   return ORB_OK;
+}
+
+/* Does a match make pins needless? Of more than two shapes, no walk competes with it. */
+static int is_enough(const posed *p, int32_t shape_count, orb_preset preset) {
+  const double most = shape_count > 2 ? ORB_FIND_POSED_POOR : orb_map_params_of(preset).energy.good;
+  return p->is_found && preset != ORB_PRESET_QUALITY && p->worst <= most;
 }
 
 /* Aligns by landmarks. If they show one body in two poses, a match comes first: it knows the surface between the
  * landmarks, and if its map is good, nothing is pinned. For 35 pairs of animals of one kind, landmark walks with 8 true
- * landmarks have up to three times the error of matches without any. */
+ * landmarks have up to three times the error of matches without any. If the match's map is less good and the pins
+ * cannot meet, it is kept: it takes each landmark to its partner too. */
 static orb_status align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                      const orb_landmark *landmarks, int32_t landmark_count,
                                      const orb_align_options *options, orb_alignment *out) {
-  const double good = orb_map_params_of(options->preset).energy.good;
-  orb_alignment other = {.energy = INFINITY};
-  int posed = 0;
+  posed p = {.is_found = 0};
   orb_status status = ORB_OK;
+  memset(out, 0, sizeof *out);
   if (landmark_count >= ORB_FIND_HINT_LEAST) {
-    ORB_TRY(align_posed(ctx, shapes, shape_count, landmarks, landmark_count, options, ORB_FIND_HINT_STRETCH, &other,
-                        &posed));
+    ORB_TRY(align_posed(ctx, shapes, shape_count, landmarks, landmark_count, options, ORB_FIND_HINT_STRETCH, &p));
   }
-  if (posed && options->preset != ORB_PRESET_QUALITY && other.energy <= good) {
-    *out = other;
+  if (is_enough(&p, shape_count, options->preset)) {
+    *out = p.alignment;
     return ORB_OK;
   }
-  ORB_GO(status, create(ctx, shapes, shape_count, landmarks, landmark_count, options, out), end);
-  status = improve(ctx, shapes, landmarks, options, &other, &posed, out);
-end:
-  if (posed) {
-    orb_alignment_free(ctx, &other);
+  status = create(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+  if (p.is_found && (status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED)) {
+    orb_error_clear(ctx);
+    *out = p.alignment;
+    return ORB_OK;
   }
+  if (status == ORB_OK) {
+    status = improve(ctx, shapes, landmarks, options, &p, out);
+  }
+  posed_free(ctx, &p);
   return status;
 }
 

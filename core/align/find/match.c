@@ -184,7 +184,11 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   ORB_TRY(orb_trials_make(t));
   ORB_TRY(orb_trials_rank(t));
   int32_t best = orb_trials_best(t);
-  if (t->count == 0 || !(t->trial[best].cost < INFINITY) || !is_one_shape(&t->trial[best], hint, stretch)) {
+  if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
+    return ORB_OK;
+  }
+  out->is_unsure = !is_one_shape(&t->trial[best], hint, stretch);
+  if (out->is_unsure) {
     return ORB_OK;
   }
   out->is_found = 1;

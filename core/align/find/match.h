@@ -42,12 +42,13 @@ typedef struct orb_match_other {
 typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_match {
-  int is_found; /* 0: a shape has too few vertices, or no map was found; nothing else is filled then */
-  double bend;  /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
-  double cost;  /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space */
-  double clear; /* 0 to 1: how far the next best map that differs is behind */
-  double lead;  /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
-                   half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
+  int is_found;  /* 0: a shape has too few vertices, or no map was found; only is_unsure is filled then */
+  int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
+  double bend;   /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
+  double cost;   /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space */
+  double clear;  /* 0 to 1: how far the next best map that differs is behind */
+  double lead;   /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
+                    half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
@@ -57,8 +58,8 @@ typedef struct orb_match {
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
  * poses. Only maps that take the first few landmarks near their partners count; the targets then take all landmarks
- * there. Free `out` in any case. About 0.6 s of one thread, whatever the size. Trials run on all threads, and the result
- * has the same bytes for any number of them. */
+ * there. Free `out` in any case. About 0.6 s of one thread, whatever the size. Trials run on all threads, and the
+ * result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
 /* Computes the target of other[k], which the caller frees, also on failure. The meshes of the match must still exist.

@@ -20,7 +20,8 @@ typedef struct orb_trial {
   orb_elastic_pose pose[2];
   double bend[2];
   double rough; /* cost in the first direction alone */
-  double cost;  /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it */
+  double cost;  /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
+                   INFINITY as  well, its poses may not be set */
 } orb_trial;
 
 /* How a shape is scaled: to area 4π, around the middle of its box. */
@@ -56,10 +57,10 @@ ORB_MUST_CHECK orb_status orb_trials_copy(const orb_trials *trials, int s, int32
 /* Makes the trials: spectral maps and rotations of the spheres. */
 ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);
 
-/* Registers all trials in one direction, drops those that are too far behind to win, and registers the others in the
- * other direction. Trials that take the landmarks elsewhere are dropped after the first direction. If all do, they are
- * dropped after the second one instead: arms that lie against a body are registered to it in one direction, but
- * correctly in the other. */
+/* Drops the trials whose rough maps take the landmarks far away, registers the others in one direction, drops those
+ * that are too far behind to win, and registers the others in the other direction. Trials that take the landmarks
+ * elsewhere are dropped after the first direction. If all do, they are dropped after the second one instead: arms that
+ * lie against a body are registered to it in one direction, but correctly in the other. */
 ORB_MUST_CHECK orb_status orb_trials_rank(orb_trials *trials);
 
 /* The number of the trial of least cost. */

@@ -6,12 +6,12 @@
  * energy of the composed map (engine/step.c). Of two shapes, the one whose triangles can follow the other one moves
  * (swap.c).
  *
- * Mirror landmarks join the landmarks if both shapes are symmetric (starts/mirror.c). They are held like landmarks,
- * unless a start is nearly a map with them and a better map without them.
+ * Mirror landmarks join the landmarks if both shapes are symmetric and no targets are given (starts/mirror.c). They are
+ * held like landmarks, unless a start is nearly a map with them and a better map without them.
  *
- * With landmarks, the caller asks for the quick way first (walked.c): a landmark walk, optimised on a coarse level and
- * refined. For shapes in other poses, it then gives spatial targets that take the landmarks near their partners
- * (targets.c). If neither gives a map, there are three kinds of starts:
+ * If landmarks show one body in two poses, the caller first gives spatial targets that take them near their partners
+ * (targets.c). Otherwise, or if that map is not good, it asks for the quick way (walked.c): a landmark walk, optimised
+ * on a coarse level and refined. If neither gives a map, there are three kinds of starts:
  * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c), which
  *   samples by eigenfunctions guide where they agree with the landmarks (starts/spectral_samples.c). This is good where
  *   it folds little. Flips are allowed against a growing barrier until untangling clears nearly all; collapses clear

@@ -1,11 +1,11 @@
-/* The targets are smoothed first, by a registration in space through samples of them, if the first level then has fewer
- * flips. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h) clears the remaining
- * flips. Where the targets are folded the map has crumpled, as in the pockets of a face and where limbs touch. So it is
- * ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples. If that leads to no map of
- * shapes that correspond, passes through samples of the best map follow. Then come two more starts, until one is such a
- * map: from the targets as given on a coarser level, and on the usual level from the targets that the first start has
- * not followed. Then passes and a draw bring the energy down. Passes come first: they find a better basin, and a draw
- * only the bottom of one. If no pass helps, the map is drawn to the given targets.
+/* Without landmarks, the targets are smoothed first, by a registration in space through samples of them, if the first
+ * level then has fewer flips. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h)
+ * clears the remaining flips. Where the targets are folded the map has crumpled, as in the pockets of a face and where
+ * limbs touch. So it is ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples. If that
+ * leads to no map of shapes that correspond, passes through samples of the best map follow. Then come two more starts,
+ * until one is such a map: from the targets as given on a coarser level, and on the usual level from the targets that
+ * the first start has not followed. Then passes and a draw bring the energy down. Passes come first: they find a better
+ * basin, and a draw only the bottom of one. If no pass helps, the map is drawn to the given targets.
  *
  * If none of these gives such a map, samples of the targets guide landmark walks (walked.h). A walk begins without
  * flips and is optimised on a coarse level, so several are tried, and the best one is refined. If the caller says so, a
@@ -32,7 +32,7 @@ static double good_energy(const orb_map_run *c) {
 }
 
 /* The energy up to which a map from a start is not improved. Landmarks hold crumples that other maps lose, and a map
- * with landmarks is then worth more time. */
+ * with landmarks is then worth more time, unless a slide follows, which smooths crumples too. */
 static double smooth_energy(const orb_map_run *c) {
   return c->pairs.landmarks > 0 && !c->keeps_angles ? c->params.targets.alike : good_energy(c);
 }
