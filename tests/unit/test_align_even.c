@@ -17,7 +17,7 @@
 #include "orbmorph/embed.h"
 #include "support_shapes.h"
 
-/* A ball with a long limb, which no embedding on the sphere keeps. */
+/* A ball with a long limb. No embedding on the sphere keeps its angles and its areas. */
 static orb_mesh limbed(orb_context *ctx) {
   orb_mesh mesh = shape_globe(ctx, 40, 60);
   for (int32_t v = 0; v < mesh.vertex_count; v++) {
@@ -131,7 +131,8 @@ static void true_places_stay(void **state) {
   close_scene(&s);
 }
 
-/* Vertices that are placed on the other side of the ball, as where limbs touch, come back to their neighbours. */
+/* Vertices that were placed on the other side of the ball, as happens where limbs touch, come back to their neighbours.
+ */
 static void outliers_come_back(void **state) {
   (void)state;
   scene s;
@@ -147,7 +148,7 @@ static void outliers_come_back(void **state) {
 }
 
 /* A cap whose places face another way goes where its rim draws it. Its places agree with each other, so they count
- * where nothing doubts them. */
+ * where nothing contradicts them. */
 static void doubted_places_come_back(void **state) {
   (void)state;
   for (unsigned char doubted = 0; doubted < 2; doubted++) {
@@ -167,7 +168,8 @@ static void doubted_places_come_back(void **state) {
   }
 }
 
-/* Noise of an edge folds triangles of a cap. Where they are flipped, their targets count less, and most open. */
+/* Noise as long as an edge folds triangles of a cap. Flipped triangles count less for their targets, and most of them
+ * unfold. */
 static void folds_open(void **state) {
   (void)state;
   scene s;
@@ -190,8 +192,8 @@ static void folds_open(void **state) {
   close_scene(&s);
 }
 
-/* A cap that is torn and unfolded has a crumple in the middle of the identity, whose energy is 1. Ironing comes back to
- * that, and nothing moves far from the crumple. */
+/* A cap that is torn and unfolded has a crumple in the middle of the identity, whose energy is 1. Ironing restores that
+ * energy and moves nothing far from the crumple. */
 static void crumples_are_ironed(void **state) {
   (void)state;
   scene s;

@@ -1,4 +1,4 @@
-/* Guided walks: where a shape that is put at the targets of its match folds, samples of the targets lead to a map. */
+/* Guided walks: if a shape folds when it is put at the targets of its match, samples of the targets lead to a map. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -29,7 +29,7 @@ static orb_mesh read_sample(orb_context *ctx, const char *name) {
   return mesh;
 }
 
-/* The neck of a giraffe is four times as long as that of a dog, so its targets fold, and no start from them comes to a
+/* The neck of a giraffe is four times as long as that of a dog, so its targets fold, and no start from them leads to a
  * map. A walk does: its energy is that of shapes that correspond. */
 static void dog_to_giraffe(void **state) {
   (void)state;

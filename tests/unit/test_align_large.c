@@ -214,7 +214,8 @@ static void whole_shapes_have_the_places(void **state) {
   close_scene(&s);
 }
 
-/* Each failed allocation of the copies and their lift leaves nothing behind: a budget that ends somewhere within. */
+/* A failed allocation while the copies are made or lifted leaves nothing behind: the memory budget ends somewhere
+ * within. */
 static void memory_may_end(void **state) {
   (void)state;
   scene s;

@@ -50,7 +50,7 @@ static int32_t tip_of(const orb_mesh *mesh, int i, int thirds) {
   return best;
 }
 
-/* Each limb goes to its counterpart, however the other creature is rotated, and though it has other proportions. */
+/* Each limb goes to its counterpart for any rotation of the other creature, even though its proportions differ. */
 static void limbs_go_to_limbs(void **state) {
   (void)state;
   static const double other[LIMBS] = {3.4, 4, 2.5, 2.9, 2.4};
@@ -79,8 +79,7 @@ static void limbs_go_to_limbs(void **state) {
   }
 }
 
-/* Further maps of a creature with five unlike limbs come by rising cost, and no two of all maps pair the same
- * vertices. */
+/* The list of maps of a creature with five unlike limbs is sorted by cost, and no two maps pair the same vertices. */
 static void others_differ(void **state) {
   (void)state;
   orb_context *ctx;
@@ -107,8 +106,8 @@ static void others_differ(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* Another map that is chosen takes the place of the best one, which becomes the first of the others, and the target
- * becomes its own. */
+/* If another map is chosen, it takes the place of the best one, the best one becomes the first of the others, and the
+ * target is that of the chosen map. */
 static void another_map_is_chosen(void **state) {
   (void)state;
   orb_context *ctx;
@@ -135,7 +134,7 @@ static void another_map_is_chosen(void **state) {
 }
 
 /* Confidence rises with the lead of the best map and falls with its bend and its energy. The odds of 3 + 1.5 are those
- * of a rigid match far ahead. */
+ * of a rigid match that leads by far. */
 static void confidence_is_monotone(void **state) {
   (void)state;
   assert_true(fabs(orb_match_confidence(0, 0.9, 10, 1) - 1 / (1 + exp(-4.5))) < 1e-12);
@@ -173,9 +172,9 @@ static orb_mesh pear_of(orb_context *ctx, int levels) {
   return mesh;
 }
 
-/* A box that is turned onto itself takes along what is mapped to it, so there are as good maps of a pear with its stem
- * at any face or corner. However little the map bends, the choice is arbitrary, and no match is called sure, which
- * begins at 0.8. */
+/* A rotation of a box onto itself also rotates what is mapped to it, so maps of a pear are equally good with its stem
+ * at any face or at any corner. However little the map bends, the choice is arbitrary, and no match is called sure,
+ * which begins at 0.8. */
 static void symmetric_shapes_are_not_sure(void **state) {
   (void)state;
   orb_context *ctx;
@@ -193,7 +192,7 @@ static void symmetric_shapes_are_not_sure(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* Two maps of the same cost share what confidence there is, whatever else speaks for them. */
+/* Two maps of the same cost share the confidence, whatever else supports them. */
 static void a_tie_is_shared(void **state) {
   (void)state;
   const double alone = orb_match_confidence(0, 1, 100, 1);
@@ -232,9 +231,9 @@ static int is_at(const orb_mesh *mesh, int32_t landmark, int32_t v) {
   return d < extent.diagonal * extent.diagonal / 64;
 }
 
-/* The match of two real shapes pairs what lies at the tips of the first, as landmarks set by hand name them, with the
- * matching tips of the second, and has at least `least` such pairs. Pairs elsewhere belong to no landmark. Skips if the
- * shapes are missing. */
+/* A match of two real shapes pairs the tips of the first, as named by landmarks set by hand, with the corresponding
+ * tips of the second, and has at least `least` such pairs. Pairs elsewhere belong to no landmark. Skips if the shapes
+ * are missing. */
 static void assert_match(const char *first, const char *second, int marks, const int32_t *mark[2], int least,
                          double clear) {
   orb_context *ctx;

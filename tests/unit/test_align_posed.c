@@ -85,7 +85,7 @@ static void unload(orb_context *ctx, body bodies[2]) {
   orb_context_destroy(ctx);
 }
 
-/* The mean distance of the images of the places from number `first` on from their true places, in diagonals. */
+/* The mean distance between the images of the places from number `first` on and their true places, in diagonals. */
 static double mean_error(orb_context *ctx, const body bodies[2], int first, const orb_alignment *a) {
   const orb_mesh *mesh[2] = {&a->shapes[0].mesh, &a->shapes[1].mesh};
   orb_nearest *tree;
@@ -118,9 +118,9 @@ static double mean_error(orb_context *ctx, const body bodies[2], int first, cons
   return sum / (bodies[0].count - first) / extent.diagonal;
 }
 
-/* The landmarks are exact and at their true places, and the shapes are two people who sit: the map is near an isometry.
- * Pinned on their spheres, the map stayed caught at an energy of 3.5; and at 1.5 where all landmarks were moved to
- * their partners at once. */
+/* The landmarks are exact and at their true places, and the shapes are two people who sit: the map is nearly an
+ * isometry. If the shapes were pinned on their spheres, the map stayed at an energy of 3.5; if all landmarks were moved
+ * to their partners at once, at 1.5. */
 static void many_true_landmarks_do_not_spoil_a_pose(void **state) {
   (void)state;
   body bodies[2];
@@ -229,11 +229,11 @@ static void few_true_landmarks_do_not_spoil_a_match(void **state) {
   unload(ctx, bodies);
 }
 
-/* One body is twisted. A match that swaps left and right with front and back would take places half a body away. */
+/* One body is twisted. A match that exchanges left with right and front with back would move places by half a body. */
 static void a_twist_is_matched(void **state) {
   (void)state;
 #ifdef __SANITIZE_ADDRESS__
-  skip(); /* it takes a minute, and what it runs is sanitized in other tests */
+  skip(); /* it takes a minute, and other tests run the same code with sanitizers */
 #endif
   body bodies[2];
   orb_context *ctx = load_or_skip((const char *const[2]){"dan-neutral.obj", "dan-twist.obj"},

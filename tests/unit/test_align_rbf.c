@@ -1,5 +1,6 @@
-/* The options of the warp: one radius for all landmarks or one for each, passes, steps, to the midpoints and one way,
- * on two and three shapes. Landmarks meet bit for bit, nothing folds, and nothing moves that should not. */
+/* The options of the warp: one radius for all landmarks or one for each, passes, steps, and targets at the midpoints or
+ * on the first shape, for two and three shapes. Landmarks meet bit for bit, nothing folds, and nothing moves that
+ * should not. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -63,7 +64,7 @@ static void every_option_meets(void **state) {
   bodies_close(&b);
 }
 
-/* One way, the first shape stays where it is, bit for bit; to the midpoints it moves. */
+/* With one_way the first shape stays where it is, bit for bit; otherwise it moves to the midpoints. */
 static void one_way_moves_the_later_shapes_only(void **state) {
   (void)state;
   bodies b;
@@ -137,7 +138,7 @@ static void a_landmark_has_a_radius_of_its_own(void **state) {
 }
 
 /* Where one step of the first pass moves the landmarks of the second pass: the paper's warp through the other
- * landmarks, from their points after the rotations to the means. */
+ * landmarks, from their points after the rotations to their means. */
 static void carry(const bodies *b, const orb_alignment *rotated, int s, double (*carried)[3]) {
   double centres[3 * COUNT], moves[3 * COUNT], radii[COUNT];
   int32_t count = 0;

@@ -56,7 +56,7 @@ static void rotate(orb_mesh *mesh) {
   orb_free(ctx, old);
 }
 
-/* x → −x, with the faces still outside. */
+/* x → −x; the faces still face outwards. */
 static void mirror(orb_mesh *mesh) {
   for (int32_t v = 0; v < mesh->vertex_count; v++) {
     mesh->positions[3 * (size_t)v] *= -1;
@@ -113,7 +113,7 @@ static void a_ball_has_spherical_harmonics(void **state) {
   shape_free(ctx, &ball);
 }
 
-/* The size of a shape and where it is say nothing. */
+/* The size and the place of a shape do not matter. */
 static void size_does_not_matter(void **state) {
   (void)state;
   orb_mesh a = creature_of(limb, reach, 3), b = creature_of(limb, reach, 3);
@@ -150,7 +150,7 @@ static void a_copy_is_found(void **state) {
   shape_free(ctx, &b);
 }
 
-/* A mirror image is found as one, and only as one. */
+/* A mirror image is found, and only as a mirror image. */
 static void a_mirror_image_is_told_apart(void **state) {
   (void)state;
   orb_mesh a = creature_of(limb, reach, 3), b = creature_of(limb, reach, 3);
@@ -168,7 +168,7 @@ static void a_mirror_image_is_told_apart(void **state) {
   shape_free(ctx, &b);
 }
 
-/* A shape with a plane of symmetry maps to itself in two ways: as it is, and left to right in the mirror. */
+/* A shape with a plane of symmetry maps to itself in two ways: by the identity and by the reflection. */
 static void twins_are_known(void **state) {
   (void)state;
   orb_mesh a = creature_of(twin_limb, twin_reach, 3);
@@ -202,7 +202,7 @@ static void threads_change_nothing(void **state) {
   shape_free(ctx, &b);
 }
 
-/* Too few vertices, or no area: no candidates, and no failure. */
+/* With too few vertices or without area there are no candidates, and no error. */
 static void what_cannot_be_used_has_no_candidates(void **state) {
   (void)state;
   orb_mesh a = shape_icosahedron(ctx), b = creature_of(limb, reach, 3);

@@ -201,7 +201,7 @@ static void compare(const sweep_case *c, orb_cpu cpu, orb_mesh (*moving)(orb_con
   drop(&many);
 }
 
-/* One sweep moves every vertex as its own step does, whatever the instruction set. */
+/* A sweep moves every vertex as the step of a single vertex does, with every instruction set. */
 static void test_same_as_single(void **unused) {
   (void)unused;
   static const sweep_case cases[] = {
@@ -248,7 +248,8 @@ static void test_same_for_threads(void **unused) {
   free(first);
 }
 
-/* A vertex of more neighbours than a batch takes moves by its single step, and its neighbours see that it moved. */
+/* A vertex with more neighbours than a batch holds moves by the step of a single vertex, and its neighbours use its new
+ * point. */
 static void test_large_star(void **unused) {
   (void)unused;
   scene s;
@@ -276,7 +277,7 @@ static void test_large_star(void **unused) {
   drop(&s);
 }
 
-/* Paths by rates and rotations end where those by positions do, and as far along. */
+/* Paths computed by rates and rotations end where those computed by positions do, and have the same length. */
 static void test_paths(void **unused) {
   (void)unused;
   scene s;

@@ -1,4 +1,4 @@
-/* Unfolding a level by collapses: whatever was folded locally, no triangle is flipped afterwards. */
+/* Unfolding a level by collapses: whichever parts were folded, no triangle is flipped afterwards. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -162,7 +162,7 @@ static void nothing_flipped(void **state) {
   drop(&b);
 }
 
-/* Two neighbours that are pinned in each other's places cannot be unfolded: the level stays as it was. */
+/* Two neighbours that are pinned at each other's places cannot be unfolded: the level stays as it was. */
 static void pinned_folds_remain(void **state) {
   (void)state;
   ball b;

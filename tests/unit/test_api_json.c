@@ -251,8 +251,8 @@ static void test_stored_meshes(void **state) {
   }
 }
 
-/* As the C library has them: every day of 400 years, the first and the last moment of far years, and random instants.
- */
+/* Dates as the C library computes them: every day of 400 years, the first and the last moment of far years, and random
+ * instants. */
 static void check_instant(int64_t unix_ms) {
   char expected[64], stamp[48];
   const time_t seconds = (time_t)(unix_ms / 1000);
@@ -305,7 +305,7 @@ static void test_integers(void **state) {
   }
 }
 
-/* What is formatted is the same wherever it meets the end of the room, which grows from 256 bytes on. */
+/* Formatted text is the same wherever it crosses the end of the buffer, which grows from 256 bytes. */
 static void test_formatted(void **state) {
   (void)state;
   for (size_t before = 0; before < 600; before++) {
@@ -320,7 +320,7 @@ static void test_formatted(void **state) {
   }
 }
 
-/* A refusal for handles says how many loops it leaves out, and nothing where it has all. */
+/* A refusal for handles says how many loops it omits, and says nothing if it has all of them. */
 static void test_loops_left_out(void **state) {
   (void)state;
   orb_error *error = calloc(1, sizeof *error);

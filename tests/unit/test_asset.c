@@ -117,7 +117,7 @@ static void animation_shows_every_shape_alone(void **state) {
   }
   assert_true(alone[0] >= 2 && alone[1] >= 2 && alone[2] >= 1);
   assert_true(glb_value(&file, output, 0, 0) == 0 && glb_value(&file, output, 2 * keys - 2, 0) == 0);
-  /* Equal names are told apart. */
+  /* Equal names are made different. */
   const cJSON *names = cJSON_GetObjectItem(cJSON_GetObjectItem(asset_mesh(&file), "extras"), "targetNames");
   assert_int_equal(cJSON_GetArraySize(names), 2);
   assert_string_equal(cJSON_GetArrayItem(names, 0)->valuestring, "two");
@@ -287,8 +287,8 @@ static void turned_ball(int32_t shape, const double p[3], double out[3]) {
   out[2] = s * q[0] + c * q[2];
 }
 
-/* A supermesh whose triangles lie across the seam and across the materials' border: coordinates never run from one side
- * of the seam to the other, and are right at every vertex whose triangles are away from it. */
+/* A supermesh whose triangles cross the seam and the materials' border: no triangle's coordinates run from one side of
+ * the seam to the other, and they are right at every vertex whose triangles are away from it. */
 static void texture_seams_are_not_crossed(void **state) {
   orb_context *ctx = *state;
   synthetic fine = synthetic_make(ctx, 4, 2, ellipsoid), made = synthetic_make(ctx, 3, 2, turned_ball);
@@ -331,7 +331,8 @@ static void texture_seams_are_not_crossed(void **state) {
         polar = fmax(polar, fabs(z));
         double off = u - atan2(y, x) / (2 * M_PI);
         off -= round(off);
-        /* Within a triangle of a border a corner may stand for the border's point: 1/8 of a right angle. */
+        /* Within a triangle at a border, a corner may stand for the border's point: the tolerance is 1/8 of a right
+         * angle. */
         assert_true(fabs(off) < (fabs(z) < 0.8 ? 0.05 : 1));
         if (fabs(z) < 0.8 && fabs(z) > 0.3 && x > 0) {
           assert_true(fabs(off) < 2e-3 && fabs(glb_value(&file, uv, v, 1) - z) < 0.02);
@@ -361,7 +362,7 @@ static void failing_free(void *user, void *block) {
   free(block);
 }
 
-/* However late memory runs out, the call says so and leaves nothing behind (the context's end asserts that). */
+/* Whenever memory runs out, the call reports it and leaves nothing behind (the context asserts that at its end). */
 static void running_out_of_memory_is_an_error(void **state) {
   (void)state;
   int failed = 0;

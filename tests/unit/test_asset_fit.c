@@ -86,7 +86,7 @@ static void auto_fits_what_clearly_differs(void **state) {
   }
 }
 
-/* A body, and another one of other proportions that leans forward, ten times as large, with z up. */
+/* A body, and a body of other proportions that leans forward, is ten times as large and has z up. */
 static void leaning_copy(int32_t shape, const double p[3], double out[3]) {
   double q[3] = {p[0], 1.2 * p[1], 0.5 * p[2]};
   if (shape == 0) {
@@ -100,8 +100,8 @@ static void leaning_copy(int32_t shape, const double p[3], double out[3]) {
   out[2] = 10 * q[1];
 }
 
-/* The best rotation of the leaning body would tip it over backwards. auto leaves its posture and turns it by the right
- * angle between the files' axes; a similarity that is asked for is the best one. */
+/* The best rotation would tip the leaning body over backwards. auto keeps its posture and rotates it by the right angle
+ * between the files' axes; if the request asks for a similarity, it gets the best one. */
 static void auto_leaves_a_posture(void **state) {
   orb_context *ctx = *state;
   synthetic made = synthetic_make(ctx, 3, 2, leaning_copy);
@@ -127,8 +127,8 @@ static void mistaken_copy(int32_t shape, const double p[3], double out[3]) {
   out[2] = scale * q[2];
 }
 
-/* A match that may be wrong rotates no shape, but scales it: unless one shape is a copy of the other, however turned.
- */
+/* A match that may be wrong only scales a shape and does not rotate it, unless the shape is a copy of the other one, in
+ * any rotation. */
 static void an_unsure_match_rotates_nothing(void **state) {
   orb_context *ctx = *state;
   static const struct {
@@ -154,7 +154,7 @@ static void an_unsure_match_rotates_nothing(void **state) {
   }
 }
 
-/* The matrix of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
+/* The matrix of that copy is the inverse of its transform. The first shape, and every shape without a fit, stays. */
 static void the_transform_is_the_inverse(void **state) {
   orb_context *ctx = *state;
   synthetic made = synthetic_make(ctx, 3, 2, moved_copy);

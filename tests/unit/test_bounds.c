@@ -1,5 +1,5 @@
-/* Files that are made to cost much: what reading them takes is bounded by their size. Times are compared with those of
- * a harmless file of the same size, so that they hold on any machine. */
+/* Files that are made to cost much: the time and memory to read them are bounded by their size. Times are compared with
+ * those of a harmless file of the same size, so the bounds hold on any machine. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -47,7 +47,7 @@ static double cpu_seconds(void) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Reads and repairs, whatever comes of it. */
+/* Reads and repairs; any result will do. */
 static double seconds_to_read(const text *t, orb_status *status) {
   orb_mesh mesh;
   double begin = cpu_seconds();
@@ -200,7 +200,7 @@ static void test_colliding_materials(void **state) {
   compare(many_materials(15000, 0), many_materials(15000, 1), 6);
 }
 
-/* A star, as one face that runs around it over and over, or as many faces that do so once. */
+/* A star, as one face that runs around it many times, or as many faces that each run around it once. */
 static text star(int turns, int one_face) {
   text t = {0};
   const char *vertices = "v 3 0 0\nv 1 1 0\nv 0 3 0\nv -1 1 0\nv -3 0 0\nv -1 -1 0\nv 0 -3 0\nv 1 -1 0\nf";
@@ -264,8 +264,8 @@ static void test_shared_indices(void **state) {
   free(file.at);
 }
 
-/* All attributes are read from the same bytes, each element one byte after the other. The process must not grow beyond
- * the budget: read in a process of its own, whose peak the kernel tells. */
+/* All attributes are read from the same bytes, each element one byte after the previous one. The process must not grow
+ * beyond the budget: the file is read in a separate process, whose peak the kernel reports. */
 static void test_overlapping_accessors(void **state) {
   (void)state;
   enum { BYTES = 8 << 20, BUDGET = 64 << 20 };
@@ -321,7 +321,7 @@ static void test_many_members(void **state) {
   free(json.at);
 }
 
-/* The densest file of each format that we know: the fewest bytes for a triangle with all attributes. */
+/* The densest known file of each format: the fewest bytes for a triangle with all attributes. */
 static text dense_obj(int size) {
   text t = {0};
   const char *head = "v 3 0 0 1 0 0\nv 0 3 0\nv 0 0 3\nvt 0 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2 3\nf";
@@ -403,8 +403,8 @@ static text dense_glb(int size) {
   return t;
 }
 
-/* One triangle a byte, shown by items of one object; as much XML as the archive may unpack to, of small elements; and
- * the rest of the bytes is a file that the reader does not want. */
+/* One triangle per byte, shown by items of one object; as much XML in small elements as the archive may unpack to; the
+ * rest of the bytes is a file that the reader does not need. */
 static text dense_3mf(int size) {
   text xml = {0};
   archive a = {0};
@@ -441,8 +441,8 @@ static text dense_3mf(int size) {
   return (text){(char *)a.bytes, a.size, a.room};
 }
 
-/* Processor seconds a byte to read and check an ordinary file, the least of three: what the times of the dense files
- * are compared with. */
+/* Processor seconds per byte to read and check an ordinary file, the least of three runs: the measure for the times of
+ * the dense files. */
 static double usual_seconds_a_byte(void) {
   text ordinary = loose_triangles(16000, 0);
   double least = HUGE_VAL;

@@ -64,7 +64,7 @@ static void test_four_heaviest(void **state) {
   assert_true(joint[0] == 0 && weight[0] == 1 && weight[1] == 0);
 }
 
-/* A thousand random blends: the sum is exact, and every weight within a rounding of its share. */
+/* A thousand random blends: the sum is exact, and every weight is within a rounding of its share. */
 static void test_sums_are_exact(void **state) {
   (void)state;
   uint32_t seed = 12345;
@@ -162,7 +162,7 @@ static void number_file(orb_context *ctx, orb_aligned_shape *shape) {
   }
 }
 
-/* A shape merged with itself: each corner's blend is its own vertex, and what is blended is what was given. */
+/* A shape merged with itself: each corner's blend is its own vertex, and the blended values are the given ones. */
 static void test_blends_of_itself(void **state) {
   orb_context *ctx = *state;
   synthetic made = synthetic_make(ctx, 2, 2, identity);
@@ -180,7 +180,7 @@ static void test_blends_of_itself(void **state) {
   }
   orb_free(ctx, blends);
 
-  /* Where one half of the triangles comes from a repair, it takes on what lies at its rim. */
+  /* If one half of the triangles comes from a repair, it takes the values at its rim. */
   orb_mesh *changed = &made.shapes[1].mesh;
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     double z = 0;
@@ -232,7 +232,8 @@ static void test_corners(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* Colours of vertices that are linear in the height, baked into charts that are the projection along x of each half. */
+/* Colours of vertices that are linear in the height, baked into two charts: the projections of the two halves along x.
+ */
 static void test_bake(void **state) {
   orb_context *ctx = *state;
   synthetic made = synthetic_make(ctx, 3, 2, identity);

@@ -1,7 +1,5 @@
-/* Documents that are awkward for what is carried: trees of nodes that are none, skeletons as deep or as wide as they
- * can be, many targets of one name. Where the work grew with the square of their size, they would run into the time
- * limit.
- */
+/* Documents that are awkward to carry over: nodes that form no tree, skeletons as deep or as wide as allowed, many
+ * targets with one name. If the work grew with the square of their size, they would exceed the time limit. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -130,7 +128,7 @@ static void nodes_that_are_no_tree(void **state) {
   }
 }
 
-/* The skeleton: a chain upwards, or all joints under the first. Its rest is where the inverse bind matrices say. */
+/* The skeleton: a chain upwards, or all joints under the first. Its rest pose is that of the inverse bind matrices. */
 static orb_buffer skeleton_glb(orb_context *ctx, int is_chain) {
   orb_buffer text = {0};
   float(*binds)[16] = calloc(JOINTS, sizeof *binds);
@@ -160,8 +158,8 @@ static orb_buffer skeleton_glb(orb_context *ctx, int is_chain) {
   return out;
 }
 
-/* The source's meshes were read at `place`, which its rest does not have: a node above the skeleton brings it. That
- * node is there only if the rest of every joint is what its bind matrix undoes. */
+/* The source's meshes were read at `place`, but its rest pose is elsewhere: a node above the skeleton moves it there.
+ * That node exists only if the rest of every joint is the inverse of its inverse bind matrix. */
 static void check_large_skeleton(orb_context *ctx, int is_chain) {
   orb_buffer source = skeleton_glb(ctx, is_chain), out = {0};
   const double place[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1};
@@ -195,9 +193,9 @@ static void deep_and_wide_skeletons(void **state) {
   check_large_skeleton(*state, 0);
 }
 
-/* Four joints, turned and scaled, whose transforms to the scene can be written by hand:
- *   0: (1 − 2y, 2 + 2x, 3 + 2z);  1: (1 + 2z, 3 + 2x, 3 + 2y);  2: 1 at x = 1;  3: 1 at y = 1
- * Times, translations and rotations of two keys, and a cubic spline. */
+/* Four joints, rotated and scaled, whose transforms to the scene can be written by hand: 0: (1 − 2y, 2 + 2x, 3 + 2z);
+ * 1: (1 + 2z, 3 + 2x, 3 + 2y); 2: 1 at x = 1; 3: 1 at y = 1. Times, translations and rotations of two keys, and a cubic
+ * spline. */
 static const float rig_values[4 * 16 + 2 + 6 + 8 + 18] = {
     0, -0.5f, 0,    0, 0.5f, 0, 0,    0, 0, 0,    0.5f, 0,  -1,    0.5f,  -1.5f, 1,    /* bind of 0 */
     0, 0,     0.5f, 0, 0.5f, 0, 0,    0, 0, 0.5f, 0,    0,  -1.5f, -1.5f, -0.5f, 1,    /* 1 */
@@ -254,7 +252,7 @@ typedef struct rig_surface {
   float weights[POINTS][4];
 } rig_surface;
 
-/* Points that joints 0 and 1, 1 and 2, or 0 alone move; joint 3 moves none. `after` is an affine image. */
+/* Points that joints 0 and 1, joints 1 and 2, or joint 0 alone move; joint 3 moves none. `after` is an affine image. */
 static void make_surface(rig_surface *s) {
   uint32_t seed = 1;
   memset(s, 0, sizeof *s);
@@ -279,7 +277,8 @@ static void assert_near(double a, double b) {
   assert_true(fabs(a - b) < 1e-5);
 }
 
-/* The turns of the rig's joints and the nodes above them, undone: what a way in the scene is below node 0, below 1. */
+/* The vector between two points of the scene in the axes of node 0 or 1: undoes the rotations of the joint and of the
+ * nodes above it. */
 static void below(int node, const double from[3], const double to[3], double out[3]) {
   double way[3];
   for (int k = 0; k < 3; k++) {
@@ -318,15 +317,16 @@ static void check_keys(const glb *file, const double shift[3]) {
     assert_near(glb_value(file, cJSON_GetObjectItem(sampler, "input")->valueint, 1, 0), 1);
     int output = cJSON_GetObjectItem(sampler, "output")->valueint, width = c == 1 ? 4 : 3;
     for (int i = 0; i < counts[c]; i++) {
-      int is_place = c == 0 || (c == 3 && i / 3 % 3 == 1); /* of three values of a spline the middle one */
+      int is_place =
+          c == 0 || (c == 3 && i / 3 % 3 == 1); /* a spline has three values per key; this is the middle one */
       assert_near(glb_value(file, output, i / width, i % width),
                   (double)rig_values[first[c] + i] + (is_place ? shift[i % 3] : 0));
     }
   }
 }
 
-/* A base that is the affine image of the shape has the joints at the affine image of theirs; a joint that moves nothing
- * stays where it is below the one above. Turns and scales stay, and at rest the base is as it is. */
+/* If the base is an affine image of the shape, the joints are at the affine images of theirs; a joint that moves
+ * nothing keeps its place relative to its parent. Rotations and scales stay, and at rest the base is unchanged. */
 static void joints_follow_the_base(void **state) {
   orb_context *ctx = *state;
   static const double rest[4][3] = {{1, 2, 3}, {1, 3, 3}, {1, 5, 3}, {1, 3, 5}};
@@ -375,7 +375,7 @@ static void joints_follow_the_base(void **state) {
   orb_buffer_free(ctx, &out);
   orb_buffer_free(ctx, &source);
 
-  /* The rest of this one shows the shape in another pose, so it says nothing about where joints belong. */
+  /* The rest pose of this document shows the shape in another pose, so it does not say where the joints belong. */
   source = rig_glb(ctx, "\"translation\":[0,1,1]");
   assert_int_equal(add_skin(ctx, &source, 4, none, &surface, &out), ORB_OK);
   file = glb_open(&out);
@@ -411,7 +411,7 @@ static void many_targets_of_one_name(void **state) {
   orb_buffer_free(ctx, &document);
 }
 
-/* 100 times a character of two bytes, then one that is not UTF-8, which becomes one of three. */
+/* A character of two bytes 100 times, then an invalid byte, which becomes a character of three bytes. */
 static void names_are_cut_between_characters(void **state) {
   orb_context *ctx = *state;
   orb_buffer more = {0};

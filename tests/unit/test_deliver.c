@@ -105,7 +105,7 @@ static void outbox(void **state) {
   end(s, &others, NULL, API_JOB_FAILED);
   assert_int_equal(catalogue_deliveries_pending(s->cat), 3);
 
-  /* One a receiver; the second one's two messages go one after another. */
+  /* One message at a time for each receiver: the second receiver's two messages go one after the other. */
   assert_int_equal(catalogue_deliveries_next(s->cat), 1000);
   assert_int_equal(due(s, 999, ALL, rows), 0);
   assert_int_equal(due(s, 1000, 1, rows), 1);
@@ -127,7 +127,7 @@ static void outbox(void **state) {
   assert_int_equal(rows[1].attempts, 1);
   assert_int_equal(rows[1].next, 9000);
 
-  /* By hand; what waits for another attempt keeps its time. */
+  /* A retry by hand. A message that waits for another attempt keeps its time. */
   assert_int_equal(catalogue_delivery_retry(s->cat, first.id, 3, 4000), STORE_NOT_FOUND);
   assert_int_equal(catalogue_delivery_retry(s->cat, first.id, 1, 4000), STORE_OK);
   assert_int_equal(due(s, 4000, ALL, rows), 2);
@@ -137,7 +137,7 @@ static void outbox(void **state) {
   assert_int_equal(due(s, INT64_MAX, ALL, rows), 1);
   assert_int_equal(catalogue_deliveries_next(s->cat), 4000);
 
-  /* A job that is forgotten keeps what is pending. */
+  /* A job that is deleted keeps its pending messages. */
   assert_int_equal(catalogue_jobs_forget(s->cat, 4), STORE_OK);
   assert_int_equal(catalogue_deliveries_of(s->cat, first.id, ALL, rows), 1);
   rows[0].state = API_DELIVERY_DELIVERED;
@@ -147,7 +147,7 @@ static void outbox(void **state) {
   free(rows);
 }
 
-/* Requests that share a job add their webhooks, at most JOB_WEBHOOKS; also when it has just ended. */
+/* Requests that share a job add their webhooks, JOB_WEBHOOKS at most, even if the job has just ended. */
 static void shared(void **state) {
   stored *s = *state;
   delivery_row *rows = calloc(ALL, sizeof *rows);

@@ -131,7 +131,7 @@ static void check_rotation(const double h[9]) {
   assert_true(fabs(trace - (s[0] + s[1] + (det < 0 ? -s[2] : s[2]))) <= 1e-13 * (s[0] + 1e-300));
 }
 
-/* Also of rank 1 and 2, near a mirror image, and of any size. */
+/* Also for matrices of rank 1 and 2, near a mirror image, and of any size. */
 static void test_rotation(void **unused) {
   (void)unused;
   for (int i = 0; i < 20000; i++) {

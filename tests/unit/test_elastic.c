@@ -66,7 +66,7 @@ static double distance(const double *x, const double *y) {
   return sqrt((x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) + (x[2] - y[2]) * (x[2] - y[2]));
 }
 
-/* For each vertex, one beside it: a map that is nowhere exact. */
+/* Maps each vertex to one beside its true place: nowhere exact. */
 static int32_t *neighbours(const orb_mesh *mesh) {
   int32_t *next = orb_alloc(ctx, (size_t)mesh->vertex_count, sizeof *next);
   assert_non_null(next);
@@ -76,7 +76,8 @@ static int32_t *neighbours(const orb_mesh *mesh) {
   return next;
 }
 
-/* A shape goes to itself, rotated, along a rough map: it hardly bends, and its rotations are the rotation. */
+/* A shape is registered to its rotated copy from a rough map: it hardly bends, and its local rotations are that
+ * rotation. */
 static void a_rotation_is_found(void **state) {
   (void)state;
   orb_mesh a = creature(3), b = creature(3);
@@ -106,7 +107,7 @@ static void a_rotation_is_found(void **state) {
   shape_free(ctx, &b);
 }
 
-/* A tube and the same tube bent by a half turn along its axis: the bend is found from a rough map. */
+/* A tube and the same tube bent by a half turn along its axis: the registration finds the bend from a rough map. */
 static void a_bent_tube_is_found(void **state) {
   (void)state;
   orb_mesh a = shape_ball(ctx, 3), b = shape_ball(ctx, 3);
@@ -138,7 +139,7 @@ static void a_bent_tube_is_found(void **state) {
   shape_free(ctx, &b);
 }
 
-/* Where an anchor's point is: it turns with the surroundings of its vertex. */
+/* The point of an anchor, which rotates with the surroundings of its vertex. */
 static double away_from_place(const orb_elastic_pose *pose, const orb_elastic_anchor *one) {
   double at[3];
   for (int k = 0; k < 3; k++) {
@@ -148,7 +149,7 @@ static double away_from_place(const orb_elastic_pose *pose, const orb_elastic_an
   return distance(at, one->place);
 }
 
-/* A ball lies on itself however it is rotated, so nothing but anchors tells where its points belong. */
+/* A ball lies on itself in every rotation, so only anchors tell where its points belong. */
 static void anchors_reach_their_places(void **state) {
   (void)state;
   enum { ANCHORS = 14 };
@@ -192,7 +193,7 @@ static double potato(const double p[3]) {
   return r;
 }
 
-/* A potato, one that is taller, and a map between them that is pushed aside around one place. */
+/* A potato, a taller one, and a map between them that is pushed aside around one place. */
 typedef struct push {
   orb_mesh a, b, start;
 } push;
@@ -221,7 +222,7 @@ static void push_close(push *s) {
   shape_free(ctx, &s->start);
 }
 
-/* How far the worst vertex is from its place. */
+/* The greatest distance of a vertex from its place. */
 static double push_left(const push *s) {
   double most = 0;
   for (int32_t v = 0; v < s->a.vertex_count; v++) {
@@ -241,7 +242,7 @@ static void a_slide_undoes_a_push(void **state) {
   push_close(&s);
 }
 
-/* The most pushed vertex is an anchor at its true place: it goes there, and its surroundings come along. */
+/* The vertex that is pushed the most is an anchor at its true place: it goes there, and its surroundings follow. */
 static void an_anchor_leads_a_slide(void **state) {
   (void)state;
   push free_one, held;
@@ -317,7 +318,7 @@ static void wrong_limbs_bend(void **state) {
   shape_free(ctx, &ball);
 }
 
-/* The same creature, rotated, larger and more finely meshed: each vertex goes to its place. */
+/* The same creature, rotated, larger and with a finer mesh: each vertex goes to its place. */
 static void a_copy_is_matched(void **state) {
   (void)state;
   orb_mesh a = creature(3), b = creature(4);
@@ -375,7 +376,7 @@ static void threads_change_nothing(void **state) {
   shape_free(ctx, &b);
 }
 
-/* A ball and an icosahedron have a match only by rotations; no failure. */
+/* A ball and an icosahedron have no match but rotations; that is not an error. */
 static void few_vertices_are_matched_by_rotations(void **state) {
   (void)state;
   orb_mesh a = shape_icosahedron(ctx), b = shape_ball(ctx, 2);
@@ -399,8 +400,8 @@ static double away(const double *x, const double *n, const double *y, const doub
   return sum;
 }
 
-/* The search by boxes finds what a look at all vertices finds, also once they have moved from where they were put into
- * blocks, and for any count of them. */
+/* The search by boxes finds the same vertex as a search of all vertices, even after they have moved from the places by
+ * which they were put into blocks, and for any number of them. */
 static void the_nearest_vertex_is_found(void **state) {
   (void)state;
   enum { MOST = 3500 };

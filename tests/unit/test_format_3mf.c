@@ -34,7 +34,7 @@ static const char RELATIONS[] =
     "Target=\"/3D/Thing.model\" "
     "Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>";
 
-/* Reads a package of a model and perhaps a second part, and the tail of both is what the test says. */
+/* Reads a package of a model and perhaps a second part; the test gives the end of both. */
 static orb_status read_package(const char *model, const char *second, int deflated, int is_wide, orb_mesh *out) {
   archive a = {.is_wide = is_wide};
   archive_add(&a, "_rels/.rels", RELATIONS, strlen(RELATIONS), deflated);
@@ -50,7 +50,7 @@ static orb_status read_package(const char *model, const char *second, int deflat
   return status;
 }
 
-/* A mesh of the text between the tags of a model. */
+/* The mesh of a model with this text between its tags. */
 static orb_mesh read_model(const char *inner, const char *second) {
   char *text = malloc(strlen(inner) + 1000);
   orb_mesh mesh;
@@ -101,7 +101,8 @@ static void test_units(void **state) {
   }
 }
 
-/* Points are rows: x' = m00·x + m10·y + m20·z + m30. A component is placed in its object, that one by the item. */
+/* Points are rows: x' = m00·x + m10·y + m20·z + m30. A component is placed in its object, and the object by the item.
+ */
 static void test_placement(void **state) {
   (void)state;
   orb_mesh mesh = read_model(
@@ -109,11 +110,11 @@ static void test_placement(void **state) {
                                    "transform=\"2 0 0 0 2 0 0 0 2 1 0 0\"/></components></object></resources><build>"
                                    "<item objectid=\"2\" transform=\"0 1 0 -1 0 0 0 0 1 0 0 0\"/></build>",
       NULL);
-  /* twice as large and moved to x = 1 … 3, then turned by 90° about z: x' = −y, y' = x */
+  /* twice as large and moved to x = 1 … 3, then rotated by 90° about z: x' = −y, y' = x */
   assert_true(mesh.positions[0] == 0 && mesh.positions[1] == 1);
   assert_true(mesh.positions[3] == 0 && mesh.positions[4] == 3);
   check_extent(&mesh, 4, 8.0 / 6, -2, 0);
-  /* a mirror turns the triangles, so that they still face outwards */
+  /* a mirror reverses the triangles, so that they still face outwards */
   mesh = read_model("><resources>" OBJECT(1, "") "</resources><build><item objectid=\"1\" "
                                                  "transform=\"-1 0 0 0 1 0 0 0 1 0 0 0\"/></build>",
                     NULL);
@@ -210,7 +211,7 @@ static void test_colours(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
-/* What is refused, and the word of the message that says why. */
+/* Refused files, and a word of the message that says why. */
 static void test_errors(void **state) {
   (void)state;
   static const struct {
@@ -254,7 +255,7 @@ static void test_errors(void **state) {
   }
 }
 
-/* Adds text that repeats. */
+/* Adds repeated text. */
 static char *repeated(const char *before, const char *middle, int count, const char *after) {
   size_t length = strlen(middle), size = strlen(before);
   char *text = malloc(size + length * (size_t)count + strlen(after) + 1);
@@ -267,7 +268,7 @@ static char *repeated(const char *before, const char *middle, int count, const c
   return text;
 }
 
-/* Files that unpack, nest or multiply to far more than they weigh. */
+/* Files that unpack, nest or multiply to much more than their size. */
 static void test_bombs(void **state) {
   (void)state;
   static const char tail[] = "</resources><build><item objectid=\"1\"/></build></model>";
@@ -306,8 +307,8 @@ static void test_bombs(void **state) {
   }
 }
 
-/* A comment, an instruction and a tag of exactly 64 KiB pass; with one byte more they are refused, wherever they lie.
- */
+/* A comment, an instruction and a tag of exactly 64 KiB are accepted. With one byte more they are refused, wherever
+ * they are. */
 static void test_tokens(void **state) {
   (void)state;
   enum { MOST = 1 << 16 };
@@ -339,7 +340,7 @@ static void test_tokens(void **state) {
   }
 }
 
-/* Every beginning, and every byte changed, gives a mesh or an error. */
+/* Every prefix of a file, and the file with any byte changed, gives a mesh or an error. */
 static void test_damage(void **state) {
   (void)state;
   static const char model[] =
@@ -367,7 +368,7 @@ static void test_damage(void **state) {
   }
 }
 
-/* Without memory at any moment it fails and frees. */
+/* Whenever memory runs out, reading fails and frees everything. */
 static void test_budget(void **state) {
   (void)state;
   static const char model[] =

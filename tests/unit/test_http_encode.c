@@ -47,7 +47,7 @@ static int gather(void *user, const char *bytes, size_t size) {
   return 1;
 }
 
-/* What the encoder writes, the decoder of request bodies reads. */
+/* The decoder of request bodies reads what the encoder writes. */
 static void same_bytes(void **state) {
   char text[50000], back[sizeof text];
   (void)state;

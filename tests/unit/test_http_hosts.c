@@ -1,4 +1,4 @@
-/* Names in Host and Origin headers: which of them a page of another site can have. */
+/* Names in Host and Origin headers, and which of them a page of another site can send. */
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <setjmp.h>

@@ -1,4 +1,5 @@
-/* Answers that are sent without a copy: the receiver gets the bytes of header and region, whatever the socket takes. */
+/* Answers that are sent without a copy: the receiver gets the bytes of header and region, however few bytes the socket
+ * takes at a time. */
 #include <fcntl.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -106,7 +107,7 @@ static int next_fd(void) {
   return fd;
 }
 
-/* There are at most 256, in any order of making and freeing, and none leaves its file open. */
+/* At most 256 regions exist, in any order of creation and release, and none leaves its file open. */
 static void many(void **state) {
   enum { MOST = 256 };
   char *bytes = pattern(), *all[MOST];

@@ -1,4 +1,4 @@
-/* Signatures of URLs: what the end of a target must be, the HMAC of RFC 4231, rotation and limits by day. */
+/* Signatures of URLs: the required end of a target, the HMAC of RFC 4231, rotation and limits per day. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

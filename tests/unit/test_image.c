@@ -1,4 +1,4 @@
-/* Pictures: every kind of PNG by its definition, also without its end, JPEGs of many scans, and cancellation. */
+/* Pictures: every kind of PNG by its definition, even without its last chunk, JPEGs of many scans, and cancellation. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -56,7 +56,7 @@ static unsigned char clear_of(uint32_t i) {
   return (unsigned char)(i < 3 ? 60 * i : 255);
 }
 
-/* What the specification says that a pixel looks like, in 8 bits per channel. */
+/* The pixel that the specification defines, in 8 bits per channel. */
 static void pixel_of(const kind *k, int x, int y, unsigned char out[4]) {
   const double most = (1 << k->depth) - 1;
   int is_gray = k->channels < 3;
@@ -115,7 +115,7 @@ static void set_colors(png_structp png, png_infop info, const kind *k) {
   }
 }
 
-/* gamma: a chunk that says that the colours are linear, which glTF tells readers to ignore. */
+/* gamma: adds a chunk that declares linear colours, which glTF tells readers to ignore. */
 static bytes write_png(const kind *k, int interlaced, int gamma) {
   bytes out = {0};
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
@@ -166,7 +166,7 @@ static void every_kind_of_png(void **state) {
   }
 }
 
-/* Other programs show a PNG whose last chunk is missing; one whose pixels are missing has no picture. */
+/* Other programs show a PNG whose last chunk is missing. A PNG whose pixels are missing has no picture. */
 static void png_without_its_end(void **state) {
   enum { IEND = 12 }; /* bytes of the last chunk: length, name, checksum */
   for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
@@ -182,8 +182,8 @@ static void png_without_its_end(void **state) {
   }
 }
 
-/* A gray JPEG. scans 0: not progressive; else one scan for each of the 64 coefficients, and so many more that refine
- * the last bit of one. */
+/* A grey JPEG. scans: 0 for one that is not progressive; otherwise it has one scan for each of the 64 coefficients, and
+ * this many more that refine the last bit of one. */
 static bytes write_jpeg(int scans) {
   struct jpeg_compress_struct info = {0};
   struct jpeg_error_mgr errors;
@@ -221,7 +221,7 @@ static bytes write_jpeg(int scans) {
   return (bytes){data, size};
 }
 
-/* The scans carry the same coefficients, so they show the same picture; too many of them are refused. */
+/* The scans have the same coefficients, so they show the same picture; too many scans are refused. */
 static void scans_have_a_limit(void **state) {
   orb_context *ctx = *state;
   bytes plain = write_jpeg(0);
@@ -246,7 +246,7 @@ static void scans_have_a_limit(void **state) {
   free(plain.data);
 }
 
-/* A job that was cancelled says so, not that its pictures are bad. */
+/* A cancelled job says so, and does not say that its pictures are bad. */
 static void cancelling_is_no_bad_picture(void **state) {
   orb_context *ctx = *state;
   bytes files[] = {write_png(&kinds[0], 0, 0), write_png(&kinds[11], 1, 0), write_jpeg(0), write_jpeg(64)};

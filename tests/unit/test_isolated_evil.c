@@ -1,4 +1,4 @@
-/* What a job's process can do to the daemon when a mesh has taken it over. This program is its own zygote, whose
+/* What a job's process can do to the daemon if a mesh has taken it over. This program is its own zygote, whose
  * processes do what the request says. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,7 +18,7 @@
 #include "store/owners.h"
 #include "worker/isolated.h"
 
-/* What follows the first object. */
+/* What the process does after the first object. */
 enum { DAMAGED = 'a', NOTHING = 'b', PROGRESS = 'c', OBJECTS = 'd' };
 
 typedef struct stored {
@@ -110,7 +110,7 @@ static void fill_id(char id[API_ID_SIZE], char letter) {
   id[API_ID_SIZE - 1] = 0;
 }
 
-/* A mesh whose file is not what its row says. */
+/* A mesh whose file differs from its row. */
 static void add_damaged_mesh(stored *s, const char *id) {
   char json[] = "{}";
   int fresh;
@@ -121,7 +121,7 @@ static void add_damaged_mesh(stored *s, const char *id) {
   assert_int_equal(catalogue_put_for(s->env.cat, &row, "", 0, &fresh), STORE_OK);
 }
 
-/* Runs a job in a process that does this. Afterwards the store is free. */
+/* Runs a job in a process that does this. Afterwards nothing holds the store. */
 static int run(stored *s, char what, api_problem *problem, isolated_end *end) {
   char key[API_ID_SIZE], mesh[API_ID_SIZE], request[128];
   fill_id(key, what);
@@ -140,7 +140,8 @@ static int run(stored *s, char what, api_problem *problem, isolated_end *end) {
   return fine;
 }
 
-/* To move the input to quarantine, the daemon waits for all who hold the store: the job must not be one of them. */
+/* To move the input to quarantine, the daemon waits for everyone who holds the store: the job must not be one of them.
+ */
 static void test_an_object_and_then_a_damaged_input(void **state) {
   stored *s = *state;
   api_problem problem = {0};
@@ -155,7 +156,8 @@ static void test_an_object_and_then_a_damaged_input(void **state) {
   api_problem_free(&problem);
 }
 
-/* After its first object it neither ends nor dies. The context has no deadline: only the hold ends it. */
+/* After its first object the process neither ends nor dies. The context has no deadline: only the limit on the hold
+ * ends it. */
 static void test_an_object_and_then_no_end(void **state) {
   static const char ways[] = {NOTHING, PROGRESS, OBJECTS};
   for (size_t i = 0; i < sizeof ways; i++) {

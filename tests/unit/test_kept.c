@@ -1,5 +1,5 @@
-/* Alignments as bytes: what is read is equal to the bit to what was written, with split triangles and attributes too,
- * and bytes that are damaged, cut, or of other shapes are refused without a trace. */
+/* Alignments as bytes: an alignment that is written and read is equal to the bit, with split triangles and attributes
+ * too; bytes that are damaged, cut, or of other shapes are refused and nothing leaks. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -154,7 +154,8 @@ static int is_refused(bodies *b, const unsigned char *bytes, size_t size, const 
   return 1;
 }
 
-/* Cut anywhere it is refused; with any byte of its numbers changed it is refused or gives a certified alignment. */
+/* An alignment that is cut anywhere is refused. One with any byte of its numbers changed is refused or gives a
+ * certified alignment. */
 static void damage_is_refused(void **state) {
   (void)state;
   bodies b;

@@ -1,4 +1,4 @@
-/* The paper's method: it is valid, optimisation lowers Eq. 3, the exponents act as in Fig. 16, a repeat gives the same
+/* The paper's method is valid, optimisation lowers Eq. 3, the exponents act as in Fig. 16, and a repeat gives the same
  * bytes. */
 #include <math.h>
 #include <pthread.h>
@@ -79,7 +79,7 @@ static void test_valid(void **unused) {
   orb_context_destroy(ctx);
 }
 
-/* Meaningless positions and coincident vertices embed, too. */
+/* The method also embeds meaningless positions and coincident vertices. */
 static void test_degenerate(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(1);
@@ -330,7 +330,7 @@ static void test_every_allocation(void **unused) {
   orb_context_destroy(plain);
 }
 
-/* One search takes at most KS_WORK samples times planes for any step and ring, or 8 triangles' samples. */
+/* One search takes at most KS_WORK samples times planes for any step and ring, or the samples of 8 triangles. */
 static void test_search_is_bounded(void **unused) {
   (void)unused;
   static const double steps[] = {0.01, 0.03, 0.11, 0.33};
@@ -350,7 +350,7 @@ static void test_search_is_bounded(void **unused) {
   orb_context_destroy(ctx);
 }
 
-/* Poles: an embedding or a refusal that says what to do, in at most three attempts of bounded optimisation. */
+/* Poles: an embedding, or a refusal that says what to do, after at most three attempts of bounded optimisation. */
 static void test_poles(void **unused) {
   (void)unused;
   static const int around[] = {200, 200, 2000, 2000}, rows[] = {2, 6, 2, 6};
@@ -362,7 +362,7 @@ static void test_poles(void **unused) {
     double *points = test_malloc(3 * n * sizeof *points);
     orb_ks_report report = {0};
     orb_status status = orb_kernel_sampling(ctx, &mesh, &options, points, &report);
-    /* Intervals grow by 1.25 from 25: so many executions insert all. */
+    /* Intervals start at 25 and grow by 1.25: this many executions insert all vertices. */
     int executions = 1 + (int)(log(1 + (double)n / 25) / log(1.25)) + 3;
     assert_in_range(report.attempts, 1, 3);
     assert_true(report.executions <= report.attempts * executions);

@@ -59,7 +59,7 @@ static void check_query(const fixture *f, const double p[3], int32_t hint) {
   }
   assert_true(fabs(sum - 1) < 1e-15);
   (void)orb_normalize(q);
-  assert_true(orb_distance2(p, q) < 1e-28); /* the place lies in direction p */
+  assert_true(orb_distance2(p, q) < 1e-28); /* the place is in direction p */
 }
 
 static void check_mesh(sphere_kind kind, int size, double jitter, unsigned seed) {

@@ -1,4 +1,4 @@
-/* Materials of glTF files: what the reader takes, what it omits and says so, and what the asset has of it. */
+/* Materials of glTF files: what the reader takes, what it omits and reports, and what reaches the asset. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -107,7 +107,7 @@ static void test_members_are_read(void **state) {
   orb_mesh_free(ctx, &copy);
 }
 
-/* Members that say the default, or have no effect, are not values. */
+/* Members that state the default, or have no effect, do not count as values. */
 static void test_defaults_are_no_values(void **state) {
   (void)state;
   orb_mesh mesh;
@@ -160,7 +160,7 @@ static void test_losses_are_named(void **state) {
   }
 }
 
-/* A material whose textures all use the second set has that set's coordinates, 2 everywhere. */
+/* If all textures of a material use the second set, the mesh has that set's coordinates, 2 everywhere. */
 static void test_set_of_material(void **state) {
   (void)state;
   orb_mesh mesh;
@@ -178,7 +178,7 @@ static void test_set_of_material(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
-/* A long list ends with a count of what it omits. */
+/* A long list ends with the number of omitted entries. */
 static void test_list_is_bounded(void **state) {
   (void)state;
   for (int count = 97; count <= 300; count += 101) {
@@ -199,7 +199,7 @@ static void test_list_is_bounded(void **state) {
   }
 }
 
-/* Other formats name what they keep in other files. */
+/* Readers of other formats name what is in other files. */
 static void test_libraries_are_named(void **state) {
   (void)state;
   static const char obj[] = "mtllib wood and stone.mtl \nmtllib b.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n";
@@ -225,7 +225,8 @@ static void ellipsoid(int32_t shape, const double p[3], double out[3]) {
   }
 }
 
-/* Texture coordinates: x and z on the side y < 0, mirrored on the other side. No seam: both sides agree at y = 0. */
+/* Texture coordinates: x and z on the side y < 0, mirrored on the other side. There is no seam: both sides agree at y =
+ * 0. */
 static void wrap_mesh(orb_mesh *mesh, const double *points) {
   mesh->texcoords = ORB_NEW0(ctx, float, 6 * mesh->triangle_count);
   for (int64_t h = 0; h < 3 * (int64_t)mesh->triangle_count; h++) {
@@ -235,7 +236,7 @@ static void wrap_mesh(orb_mesh *mesh, const double *points) {
   }
 }
 
-/* The first shape of `made` gets a material of its own with the given values. */
+/* Gives the first shape of `made` a material of its own with these values. */
 static void dress(synthetic *made, const orb_material_value *values, int32_t count) {
   orb_mesh *mesh = &made->shapes[0].mesh, png;
   read_material("\"normalTexture\":{\"index\":0}", &png);
@@ -265,8 +266,8 @@ static glb write_asset(const synthetic *made, const orb_asset_options *options, 
 }
 
 /* Away from y = 0, where vertices are split, tangents on both shapes follow x, the direction in which u grows, as far
- * as the surface does; the bitangent, which points to smaller v, follows −z. Turned by the texture transform: the other
- * way round. */
+ * as the surface does; the bitangent, which points to smaller v, follows −z. The texture transform rotates the
+ * coordinates by a half turn, and both directions are reversed. */
 static void test_tangents(void **state) {
   (void)state;
   for (int turned = 0; turned < 2; turned++) {
@@ -321,7 +322,7 @@ static void test_tangents(void **state) {
   }
 }
 
-/* Without normals there are no tangents, and what needs them is omitted and named. */
+/* Without normals there are no tangents, and what needs them is omitted and reported. */
 static void test_no_normals(void **state) {
   (void)state;
   synthetic made = synthetic_make(ctx, 2, 2, ellipsoid);
@@ -362,7 +363,7 @@ static void test_no_normals(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* With any budget of memory, the asset and its list are either written or refused, and nothing leaks. */
+/* For every memory budget, the asset and its list are either written or refused, and nothing leaks. */
 static void test_budgets(void **state) {
   (void)state;
   synthetic made = synthetic_make(ctx, 1, 2, ellipsoid);

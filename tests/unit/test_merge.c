@@ -100,7 +100,7 @@ static void two_ellipsoids(void **state) {
   double parts = result.timings.align + result.timings.remesh + result.timings.transfer + result.timings.write;
   assert_true(fabs(parts - result.timings.total) < 1e-6);
   assert_string_equal(all.seen, "artw"); /* the alignment embeds again, without reporting those stages */
-  /* Each landmark is one vertex of the file, at its place on both shapes up to float32. */
+  /* Each landmark is one vertex of the file, at the landmark's place on both shapes up to float32. */
   glb file = glb_open(&result.asset);
   const cJSON *mesh = cJSON_GetArrayItem(cJSON_GetObjectItem(file.json, "meshes"), 0);
   const cJSON *primitive = cJSON_GetArrayItem(cJSON_GetObjectItem(mesh, "primitives"), 0);
@@ -145,7 +145,7 @@ static void one_shape_is_refused(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* If all vertices of either shape are at one place, there is nothing to show. */
+/* If all vertices of either shape are at one place, the merge is refused. */
 static void shapes_of_no_size_are_refused(void **state) {
   (void)state;
   orb_context *ctx;
@@ -170,8 +170,8 @@ static void shapes_of_no_size_are_refused(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* An overlay reproduces both surfaces exactly, however crumpled they are, so none of its triangles is inverted. Judged
- * by smooth normals alone, two fifths would be. */
+/* An overlay reproduces both surfaces exactly, however crumpled they are, so none of its triangles is inverted. Smooth
+ * normals alone would call two fifths inverted. */
 static void an_overlay_of_crumpled_shapes_inverts_nothing(void **state) {
   (void)state;
   orb_context *ctx;

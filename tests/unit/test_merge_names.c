@@ -1,5 +1,5 @@
-/* Names of found landmarks, against truth from elsewhere: the limbs of the bones that made a body of the samples, and
- * the parts that the makers of real bodies marked. */
+/* Compares names of found landmarks with the truth from another source: the limbs of the bones from which a body of the
+ * samples was made, and the parts that the makers of real bodies marked. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,7 +19,7 @@
 
 enum { POINTS = 12 };
 
-/* Points that are far from each other, tips first, as found landmarks are. */
+/* Points that are far from each other, tips first, like found landmarks. */
 static void spread(const double *positions, int count, int out[POINTS]) {
   double *far = malloc((size_t)count * sizeof *far);
   assert_non_null(far);
@@ -48,7 +48,7 @@ static orb_mesh mesh_of(const orb_sample *sample) {
                     .triangles = (int32_t *)sample->triangles};
 }
 
-/* Names the points of a body; names by vertex number. Returns how many have one. */
+/* Names the points of a body, by vertex number. Returns how many have a name. */
 static int name_points(const orb_sample *sample, int vertices[POINTS], const char *names[POINTS]) {
   double at[3 * POINTS];
   int named = 0;
@@ -100,7 +100,7 @@ static const char *word_of(posed_limb limb) {
   }
 }
 
-/* What a vertex of a body at rest belongs to: the limb of the nearest bone. */
+/* The limb of a vertex of a body at rest: that of the nearest bone. */
 static const char *truth_of(const posed_rest *rest, const double *p) {
   int best = 0;
   for (size_t i = 1; i < rest->animal.primitive_count; i++) {
@@ -114,7 +114,8 @@ static const char *truth_of(const posed_rest *rest, const double *p) {
   return word_of(rest->kind->bones[best].limb);
 }
 
-/* Moves a body: to z up, turned by an angle about up, or mirrored, which changes left and right. */
+/* Moves a body: rotates it to z up, rotates it by an angle about the vertical, or mirrors it, which exchanges left and
+ * right. */
 static void transform(orb_sample *body, int z_up, double angle, int mirror) {
   for (int v = 0; v < body->vertex_count; v++) {
     double *p = body->positions + 3 * v, x = p[0], y = p[1], z = mirror ? -p[2] : p[2];
@@ -166,7 +167,7 @@ static void *copy_of(const void *block, size_t size) {
   return memcpy(copy, block, size);
 }
 
-/* The number of names of a body in a pose; each must be true. */
+/* Returns how many names a body gets in a pose; each must be true. */
 static int check_pose(const animal *a, const char *pose, int z_up, double angle, int mirror) {
   orb_sample body = a->body;
   body.positions = copy_of(body.positions, 3 * (size_t)body.vertex_count * sizeof *body.positions);
@@ -188,7 +189,7 @@ static int check_pose(const animal *a, const char *pose, int z_up, double angle,
   return named;
 }
 
-/* Who stands or walks on four limbs gets words for limbs and head; names are true in every pose. */
+/* Bodies that stand or walk on four limbs get words for limbs and head. Names are true in every pose. */
 static void test_animals(void **state) {
   (void)state;
   static const char *const kinds[] = {"dog", "giraffe", "elephant", "horse", "cow", "cat", "person"};
@@ -269,7 +270,8 @@ static int agrees(const char *name, const char *part) {
   return 0;
 }
 
-/* Real people, turned about the vertical or anyhow: each name is true, and most who stand have all five. */
+/* Real people, rotated about the vertical or arbitrarily: each name is true, and most people who stand have all five
+ * names. */
 static void test_people(void **state) {
   (void)state;
   static const char *const people[] = {"ada", "ben", "cora", "dan", "emmy", "fay"};

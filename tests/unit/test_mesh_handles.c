@@ -1,4 +1,4 @@
-/* Closing handles: what is cut, what stays, and the loops of what is refused. */
+/* Closing handles: which are cut, which stay, and the loops of those that are refused. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -103,7 +103,7 @@ static double winding(const orb_mesh *raw, const int32_t *loop, int count) {
   return total / (4 * M_PI);
 }
 
-/* Every face of the file is still there with its corners' places; the others are patches. */
+/* Every face of the file still exists with its corners at their places; the others are patches. */
 static void check_faces_stay(const orb_mesh *raw, const orb_mesh *mesh) {
   int32_t kept = 0;
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
@@ -120,8 +120,8 @@ static void check_faces_stay(const orb_mesh *raw, const orb_mesh *mesh) {
   assert_int_equal(kept, raw->triangle_count);
 }
 
-/* tell: whether the body is so thick that tubes do not pierce it, and `filled` says on which side of it a loop lies.
- * Returns the processor time that closing took, in seconds. */
+/* tell: the body is so thick that no tube pierces it, so `filled` says on which side of it a loop is. Returns the
+ * processor time of the closing, in seconds. */
 static double close_all(orb_mesh *plain, int count, unsigned seed, double size, int tell) {
   size_t length;
   int made;
@@ -229,8 +229,8 @@ static void check_refused(orb_mesh *mesh, const orb_repair_options *options, int
   orb_mesh_free(ctx, mesh);
 }
 
-/* Real scans, where their folder is there. ORB_HANDLES_ALL=1: every number of handles up to 50, as tests/long.sh does,
- * and the processor time of large meshes. */
+/* Real scans, if their folder exists. ORB_HANDLES_ALL=1: every number of handles up to 50, as tests/long.sh does, and
+ * the processor time of large meshes. */
 static void test_scans(void **state) {
   (void)state;
   int all = getenv("ORB_HANDLES_ALL") != NULL;
@@ -313,8 +313,8 @@ static void test_refused(void **state) {
   assert_non_null(strstr(orb_context_error(ctx)->detail, "handle_size"));
 }
 
-/* What the loops of one mesh are checked with: half-edges by the vertex they leave, and the numbers of the last loop
- * and walk that passed a vertex and a face. */
+/* The data to check the loops of one mesh: half-edges by the vertex they leave, and the numbers of the last loop and
+ * walk that passed a vertex and a face. */
 typedef struct many {
   const orb_mesh *raw;
   int32_t *twin, *first, *list, *next, *vertex_loop, *face_loop, *queue;
@@ -350,8 +350,8 @@ static void many_close(many *m) {
   }
 }
 
-/* As check_loop(), but stops where a walk over faces from the left of the loop's first edge, which does not cross the
- * loop, arrives on the right: with very many loops, each is checked near its handle. number: 1 for the first loop. */
+/* Like check_loop(), but stops if a walk over faces from the left of the loop's first edge, which does not cross the
+ * loop, reaches the right side: with very many loops, each is checked near its handle. number: 1 for the first loop. */
 static void check_near(many *m, const int32_t *loop, int count, int32_t number) {
   int32_t start = -1, head = 0, tail = 0;
   assert_true(count >= 3);
@@ -410,7 +410,7 @@ static void test_many(void **state) {
       check_near(&m, error->loop_vertices + error->loop_start[k], error->loop_start[k + 1] - error->loop_start[k],
                  k + 1);
     }
-    /* the holes are squares of edge 1 and no bar is thicker, so loops of length 4 are there: few are much longer */
+    /* the holes are squares of edge 1 and no bar is thicker, so loops of length 4 exist: few loops are much longer */
     assert_true(error->loop_start[holes] <= 5 * holes);
     many_close(&m);
     orb_mesh_free(ctx, &raw);
@@ -418,8 +418,8 @@ static void test_many(void **state) {
   }
 }
 
-/* The shortest loop of a torus goes around its tube, and is cut where it is allowed. The caps of a tube of n sides have
- * the area of a polygon each. */
+/* The shortest loop of a torus goes around its tube, and the repair cuts it if it may. The caps of a tube of n sides
+ * have the area of a polygon each. */
 static void test_torus(void **state) {
   (void)state;
   enum { N = 24 };
@@ -446,7 +446,7 @@ static void test_torus(void **state) {
   orb_mesh_free(ctx, &ring);
 }
 
-/* Small handles are closed and a large one is left, whose loop is shown. */
+/* Small handles are closed and a large one stays; its loop is reported. */
 static void test_mixed(void **state) {
   (void)state;
   orb_mesh ring = torus(80, 1);
@@ -460,7 +460,7 @@ static void test_mixed(void **state) {
   check_refused(&ring, &options, 1);
 }
 
-/* Wherever memory runs out, the call says so and leaks nothing, which orb_context_destroy() checks. */
+/* Whenever memory runs out, the call reports it and leaks nothing, which orb_context_destroy() checks. */
 static void test_memory(void **state) {
   (void)state;
   size_t size;

@@ -36,7 +36,7 @@ static void test_safe(void **state) {
   assert_int_equal(mesh.repair_count, 0);
   orb_mesh_free(ctx, &mesh);
 
-  /* inside out: reversed, also by none */
+  /* inside out: reversed, also without a repair */
   assert_int_equal(read_repaired(TETRA_V "f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n", ORB_REPAIR_NONE, &mesh), ORB_OK);
   assert_int_equal(shape_repaired(&mesh, "turn-inside-out"), 4);
   orb_mesh_extent(&mesh, &extent);
@@ -125,7 +125,7 @@ static void test_refusals(void **state) {
   for (int i = 0; i < 3; i++) { /* the rim is 2 3 4, counted from 0 in the file */
     assert_true(error->edges[i][0] >= 2 && error->edges[i][1] >= 2);
   }
-  /* two faces back to back: one is left */
+  /* two faces back to back: one stays */
   assert_int_equal(read_repaired(TETRA_V "f 1 2 3\nf 1 3 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
   assert_int_equal(read_repaired(TETRA_V "f 1 1 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
   assert_int_equal(read_repaired(TETRA_V "f 1 3 2\nf 1 2 4\nf 1 3 4\nf 2 3 4\n", ORB_REPAIR_NONE, &mesh),
@@ -237,7 +237,7 @@ static void test_fill(void **state) {
   }
 }
 
-/* The part of a ball whose triangles `keep` wants, as OBJ; free() it. */
+/* The triangles of a ball for which `keep` is true, as OBJ; free() it. */
 static char *cut_ball(int levels, int (*keep)(const double *)) {
   orb_mesh ball = shape_ball(ctx, levels);
   char *text = malloc(80 * (size_t)(ball.vertex_count + ball.triangle_count)), *p = text;
@@ -276,9 +276,9 @@ static int beside_band(const double *p) { /* an eye mask of a hole: long, bent, 
   return !(p[0] > 0.2 && fabs(p[2]) < 0.35);
 }
 
-/* A ball that lacks a part gets nearly that part again: no point of what fills it is a tenth as far from the ball as
- * the flat disc in a cap's rim. Its triangles grow from the rim inwards, where a polygon's diagonals cross the whole
- * hole. */
+/* The repair closes a ball that lacks a part with nearly that part: every point of the filling is less than a tenth as
+ * far from the ball as the flat disc in a cap's rim is. Its triangles grow from the rim inwards, where a polygon's
+ * diagonals cross the whole hole. */
 static void test_fair_fill(void **state) {
   (void)state;
   const double flat = 1 - cos(0.7), across = 2 * sin(0.7);
@@ -321,8 +321,8 @@ static void test_fair_fill_without_memory(void **state) {
   free(text);
 }
 
-/* A tube of length 1 whose ends have many edges: each gets a dome, between the flat cap and the half ball. The
- * triangles of the domes are O(edges), as the limit of a file must not be reached by holes. */
+/* A tube of length 1 whose ends have many edges: each end gets a dome, between the flat cap and the half ball. The
+ * domes have O(edges) triangles, so holes do not exhaust the limit of a file. */
 static void test_fair_fill_of_tube(void **state) {
   (void)state;
   const int n = 1000;

@@ -1,4 +1,4 @@
-/* Splitting edges of more than two faces: bodies of unit cubes, whose volume and pieces are counted. */
+/* Splitting edges of more than two faces: bodies of unit cubes, with known volumes and numbers of pieces. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -16,7 +16,7 @@
 
 enum { N = 4, CORNERS = (N + 1) * (N + 1) * (N + 1) };
 
-/* Cells of a grid, of which some are filled. */
+/* The cells of a grid, some of them filled. */
 typedef struct grid {
   unsigned char filled[N][N][N]; /* x, y, z */
 } grid;
@@ -93,7 +93,7 @@ static orb_status repair(const char *text, unsigned how, orb_mesh *mesh) {
 
 static char text[1 << 16];
 
-/* Cells that touch along an edge and are joined elsewhere, at one end of it or at none. */
+/* Cells that touch along an edge and are joined elsewhere: at one end of the edge, or at neither. */
 static void test_pinched_columns(void **state) {
   (void)state;
   orb_mesh mesh;
@@ -121,7 +121,7 @@ static void test_pinched_columns(void **state) {
   assert_int_equal(mesh.source[mesh.vertex_of_source[0]], 0);
   orb_mesh_free(ctx, &mesh);
 
-  /* a handle that is closed along the edge: the columns join there instead, since both ends are one fan */
+  /* a handle that is closed along the edge: the columns join there, since both ends are one fan */
   memset(&g, 0, sizeof g);
   for (int z = 0; z < 3; z++) {
     g.filled[0][0][z] = g.filled[1][1][z] = 1;
@@ -136,7 +136,7 @@ static void test_pinched_columns(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
-/* Whatever the cells are, no edge is left with more than two faces, nothing is added, and the volume is theirs. */
+/* For any cells, no edge keeps more than two faces, nothing is added, and the volume is that of the cells. */
 static void test_random_cells(void **state) {
   (void)state;
   int spheres = 0, split = 0;
@@ -226,7 +226,7 @@ static void test_vertex_and_chambers(void **state) {
   assert_int_equal(repair(chambers, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_MANIFOLD);
   orb_mesh_free(ctx, &mesh);
   assert_int_equal(repair(chambers, ORB_REPAIR_SPLIT | ORB_REPAIR_LARGEST_COMPONENT, &mesh), ORB_OK);
-  assert_int_equal(mesh.triangle_count, 6); /* the wall is what goes */
+  assert_int_equal(mesh.triangle_count, 6); /* the wall is removed */
   orb_mesh_free(ctx, &mesh);
 }
 

@@ -1,4 +1,4 @@
-/* The nearest point of a triangle set against a plain search over all triangles. */
+/* Compares the nearest point of a set of triangles with a plain search over all triangles. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -57,7 +57,7 @@ static void no_point_of_a_grid_is_nearer(void **state) {
     assert_true(fabs(orb_nearest_query(one, p, INFINITY, &other) - d2) < 1e-13);
     orb_nearest_destroy(ctx, one);
   }
-  for (int k = 0; k < 9 * COUNT; k++) { /* squared distances beyond all numbers: some place all the same */
+  for (int k = 0; k < 9 * COUNT; k++) { /* squared distances that overflow: the result is still some place */
     positions[k] *= 1e300;
   }
   orb_nearest_destroy(ctx, tree);

@@ -1,6 +1,6 @@
-/* The client for URLs that callers name: which addresses it refuses, whatever way they are written, come by from a
- * resolver, or are redirected to. The servers of this test are on loopback; the resolver is this file's getaddrinfo(),
- * which the linker gives to libcurl. */
+/* The client for URLs that callers name, and the addresses that it refuses, in every notation, from a resolver, or from
+ * a redirect. The servers of this test are on loopback; the resolver is this file's getaddrinfo(), which the linker
+ * gives to libcurl. */
 #include <arpa/inet.h>
 #include <dlfcn.h>
 #include <netdb.h>
@@ -20,7 +20,7 @@
 
 #include "net/client.h"
 
-/* Names of the test, and what they resolve to the first time and from then on. */
+/* The names of the test, and the addresses to which they resolve the first time and later. */
 static struct name {
   const char *name, *first, *later;
   int asked;
@@ -42,10 +42,10 @@ int getaddrinfo(const char *host, const char *service, const struct addrinfo *hi
   return real(host, service, hints, out);
 }
 
-/* A server of one address that answers by path and counts what reaches it. */
+/* A server on one address that answers by path and counts its requests. */
 typedef struct origin {
   int fd, port, hits;
-  char to[128]; /* where /to redirects */
+  char to[128]; /* the target of /to */
   pthread_t thread;
 } origin;
 
@@ -294,7 +294,7 @@ static void public_addresses(void **state) {
   assert_false(address_is_public(&(struct sockaddr){.sa_family = AF_UNIX}));
 }
 
-/* 127.0.0.2 is listed; 127.0.0.1, which must not be reached, is not. */
+/* 127.0.0.2 is listed; 127.0.0.1 is not, and must not be reached. */
 static void listed_and_others(void **state) {
   origin listed, other;
   networks set;
@@ -312,7 +312,7 @@ static void listed_and_others(void **state) {
   snprintf(url, sizeof url, "http://listed.test:%d/", listed.port);
   assert_int_equal(get(url, &set, 5, &out, NULL), NET_ANSWERED);
 
-  /* Redirects: to where it may go, to where it may not, for ever. */
+  /* Redirects: to an address that is allowed, to one that is not, and endlessly. */
   snprintf(listed.to, sizeof listed.to, "http://listed.test:%d/", listed.port);
   snprintf(url, sizeof url, "http://127.0.0.2:%d/to", listed.port);
   memset(&body, 0, sizeof body);
@@ -335,7 +335,7 @@ static void listed_and_others(void **state) {
   assert_int_equal(get(url, &set, 3, &out, NULL), NET_FAILED);
   assert_int_equal(__atomic_load_n(&listed.hits, __ATOMIC_SEQ_CST) - before, 4);
 
-  /* A name that resolves to a listed address first, and to another one when it is asked again. */
+  /* A name that resolves to a listed address the first time and to another one the second time. */
   snprintf(url, sizeof url, "http://rebinding.test:%d/", listed.port);
   assert_int_equal(get(url, &set, 5, &out, NULL), NET_ANSWERED);
   snprintf(url, sizeof url, "http://rebinding.test:%d/", other.port);

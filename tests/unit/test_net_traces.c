@@ -1,4 +1,4 @@
-/* Spans for a collector that is not there: who records them never waits, and what does not fit is counted. */
+/* Spans for a collector that does not exist: recording them never waits, and spans beyond the limit are counted. */
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <setjmp.h>

@@ -92,7 +92,7 @@ static void test_exactly_flat(void **unused) {
   assert_true(counts[1] > 300);
 }
 
-/* Arbitrary bit patterns, and products that underflow or overflow though the sign is clear. */
+/* Arbitrary bit patterns, and products that underflow or overflow although the sign is clear. */
 static void test_extremes(void **unused) {
   (void)unused;
   memset(counts, 0, sizeof counts);

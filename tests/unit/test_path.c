@@ -95,7 +95,7 @@ static void a_bending_limb_keeps_its_length(void **state) {
   orb_arap *path;
   assert_int_equal(orb_arap_create(ctx, bar.positions, b, n, bar.triangles, bar.triangle_count, &path), ORB_OK);
   assert_int_equal(orb_arap_at(ctx, path, 0.5, at), ORB_OK);
-  /* The middle line bent by 60 degrees over the same arc: how far its ends are from each other. */
+  /* The centre line bent by 60 degrees over the same arc: the distance between its ends. */
   double half = 60 * M_PI / 180, r = 4 / half, leg = (high - low) / 2 - 2;
   double dx = r * (1 - cos(half)) + leg * sin(half), dy = r * sin(half) + leg * cos(half) + leg;
   double wanted = sqrt(dx * dx + dy * dy), got = sqrt(orb_distance2(at + 3 * top, at + 3 * bottom));

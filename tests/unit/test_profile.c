@@ -1,4 +1,5 @@
-/* Profiles: what meshoptimizer's decoder makes of one lies within the stated bounds of the float asset. */
+/* Profiles: the data that meshoptimizer's decoder makes of a profile are within the stated bounds of the float asset.
+ */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,14 +24,15 @@ static int teardown(void **state) {
   return 0;
 }
 
-/* Ellipsoids far from the origin: every shape another axis. */
+/* Ellipsoids far from the origin, each with other axes. */
 static void ellipsoid(int32_t shape, const double p[3], double out[3]) {
   for (int c = 0; c < 3; c++) {
     out[c] = (c == shape ? 2.5 : 1) * p[c] + 3 * (c + 1);
   }
 }
 
-/* A ball turned around an axis: the angle between the normals goes from 0 at the poles to the whole turn. */
+/* A ball and its copies rotated about an axis: the angle between the normals is 0 at the poles and the whole rotation
+ * at the equator. */
 static void turned(const double p[3], double turn, double out[3]) {
   double c = cos(turn), s = sin(turn);
   out[0] = c * p[0] - s * p[1];
@@ -52,7 +54,7 @@ static orb_buffer write_asset(orb_context *ctx, int levels, int shapes, syntheti
   orb_asset_options options;
   orb_buffer out = {0};
   orb_asset_defaults(&options);
-  options.fit = ORB_FIT_NONE; /* or a turned shape would be turned back */
+  options.fit = ORB_FIT_NONE; /* or a rotated shape would be rotated back */
   assert_int_equal(orb_asset_write(ctx, &made.supermesh, made.shapes, NAMES, &options, NULL, &out), ORB_OK);
   synthetic_free(ctx, &made);
   return out;
@@ -260,7 +262,7 @@ static void check_profiles(orb_context *ctx, int levels, int shapes, synthetic_m
     assert_int_equal(orb_profile_write(ctx, asset.data, asset.size, (orb_profile)p, &only, NULL), ORB_OK);
     assert_true(out.size < asset.size);
     compare(&wanted, &got, &facts);
-    /* The bound is at most half the diagonal of a cell of the grid, and what float32 arithmetic adds. */
+    /* The bound is at most half the diagonal of a cell of the grid plus the rounding of float32 arithmetic. */
     double step = cJSON_GetArrayItem(
                       cJSON_GetObjectItem(cJSON_GetArrayItem(cJSON_GetObjectItem(packed.json, "nodes"), 0), "scale"), 0)
                       ->valuedouble;
@@ -309,7 +311,7 @@ static int normal_type(orb_context *ctx, synthetic_map map, int of_target, doubl
   return type;
 }
 
-/* Of 60 bytes per vertex and its two triangles 36 are left, or 44 where a normal turns too far for integers. */
+/* Of 60 bytes per vertex and its two triangles 36 are left, or 44 if a normal rotates too far for integers. */
 static void quantized_normals_are_bytes(void **state) {
   double share;
   assert_int_equal(normal_type(*state, ellipsoid, 0, &share), 5120);
@@ -334,7 +336,7 @@ static void equal_assets_give_equal_bytes(void **state) {
   orb_buffer_free(ctx, &asset);
 }
 
-/* Whatever is wrong with the stored bytes is an error, never a read beyond them (the sanitizers see that). */
+/* Any damage to the stored bytes is an error and never a read beyond them (the sanitizers see that). */
 static void damaged_assets_are_refused(void **state) {
   orb_context *ctx = *state;
   orb_buffer asset = write_asset(ctx, 1, 2, ellipsoid), out = {0};

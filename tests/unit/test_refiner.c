@@ -245,7 +245,7 @@ static void test_distortion(void **unused) {
   assert_near(d.area.mean, 0, 1e-9);
   assert_true(d.area.std < 1e-6);
   assert_near(d.stretch_efficiency, 1 / (0.5 * (0.25 + 4)), 1e-9);
-  /* Half of the area stretched by another factor: weighted percentiles and the spread of area. */
+  /* Half of the area is stretched by another factor: weighted percentiles and the spread of area. */
   for (int i = 0; i < 9 * N; i++) {
     from[i] = i % 9 < 3 ? 0 : i % 9 < 6 ? i % 3 == 0 : i % 3 == 1;
     to[i] = from[i] * (i / 9 < N / 4 ? 3 : 1);

@@ -505,8 +505,8 @@ static void sharp_edges_survive(void **state) {
   kept_free(&k);
 }
 
-/* A spike of one vertex, four times as long as its ball is thick and a thirtieth as wide as it is long, where the other
- * shape has none: its tip and its flanks stay. */
+/* A spike of one vertex, four times as long as its ball is thick and a thirtieth as wide as it is long, opposite a
+ * smooth part of the other shape: its tip and its flanks stay. */
 static void thin_limbs_survive(void **state) {
   (void)state;
   static const double tolerance = 0.002;

@@ -1,4 +1,4 @@
-/* Rims of filled holes as edges of a supermesh, checked by the arcs of the shape themselves. */
+/* Rims of filled holes as edges of a supermesh, checked by the arcs of the shape itself. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -71,7 +71,7 @@ static double from_vertices(const orb_supermesh *m, const double p[3]) {
   return sqrt(least);
 }
 
-/* Each end of each arc of a rim is a vertex, and each point between them is on an edge. Returns how many arcs. */
+/* Each end of each arc of a rim is a vertex, and each point between them is on an edge. Returns the number of arcs. */
 static int assert_rims(const orb_supermesh *m, const orb_aligned_shape *shape) {
   const orb_mesh *mesh = &shape->mesh;
   int arcs = 0;
@@ -138,7 +138,7 @@ static void rims_become_edges(void **state) {
   }
 }
 
-/* Where the limit of triangles leaves no room for the rims, the result says so, and keeps the limit. */
+/* If the limit of triangles leaves no room for the rims, the result says so, and keeps the limit. */
 static void no_room_for_rims(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
@@ -158,7 +158,7 @@ static void no_room_for_rims(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* A first shape without filled holes has no rims, and a later one has none to give. */
+/* A first shape without filled holes has no rims; a later shape has none to give. */
 static void only_the_first_shape_has_rims(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);

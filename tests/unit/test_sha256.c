@@ -37,7 +37,7 @@ static void test_cuts(void **state) {
   }
 }
 
-/* FIPS 180-4's million letters a, in calls of a size that no block divides, from an address that nothing aligns. */
+/* FIPS 180-4's million letters a, in calls of a size that divides no block, from an unaligned address. */
 static void test_million(void **state) {
   (void)state;
   static unsigned char letters[10007];

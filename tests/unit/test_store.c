@@ -67,7 +67,7 @@ static void test_objects(void **state) {
   assert_int_equal(pread(fd, part, 4, 6), 4); /* a reader that has it open can continue */
   assert_string_equal(part, "6789");
   close(fd);
-  assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK); /* gone is gone */
+  assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK); /* a deleted object is gone */
   assert_int_equal(objects_load(s->store, OBJECT_MESH, id, &bytes, &size), STORE_NOT_FOUND);
   assert_int_equal(objects_put(s->store, OBJECT_MESH, other, "", 0), STORE_OK);
   assert_int_equal(objects_load(s->store, OBJECT_MESH, other, &bytes, &size), STORE_OK);
@@ -431,7 +431,7 @@ static void test_forgetting(void **state) {
   stored *s = *state;
   job_row jobs[4] = {new_job('1'), new_job('2'), new_job('3'), new_job('4')}, got;
   event_row event;
-  for (int i = 0; i < 4; i++) { /* the oldest is not ended */
+  for (int i = 0; i < 4; i++) { /* the oldest has not ended */
     assert_int_equal(catalogue_job_insert(s->cat, &jobs[i], NULL), STORE_OK);
     assert_int_equal(catalogue_job_claim(s->cat, jobs[i].id, 1, 0, 10), STORE_OK);
     catalogue_event(s->cat, jobs[i].id, 1, "progress", "{}");
@@ -459,7 +459,7 @@ static void test_forgetting(void **state) {
   assert_int_equal(read_job(s, jobs[0].id).state, API_JOB_RUNNING);
 }
 
-/* Any number of tokens is possible; all are listed by name. */
+/* The store takes any number of tokens and lists all by name. */
 typedef struct number {
   char *all; /* the numbers of the writes in the order in which they ran */
   char own;
@@ -479,7 +479,7 @@ static void *number_of(char *all, char own) {
   return n;
 }
 
-/* Writes that wait for others run in order, with the next one that somebody waits for, or soon without any. */
+/* Delayed writes run in order: with the next write that a caller waits for, or soon without one. */
 static void test_gathered(void **state) {
   stored *s = *state;
   char all[64] = "";

@@ -1,5 +1,6 @@
-/* Eviction over more rows than one page: rows that unfinished jobs need stay wherever they are in the order of use; the
- * others leave, oldest first, and no more than the budget requires. And what a damaged object takes with it. */
+/* Eviction over more rows than one page: rows that unfinished jobs need stay, wherever they are in the order of use;
+ * the others leave, oldest first, and no more than the budget requires. Also tests what leaves together with a damaged
+ * object. */
 #include <pthread.h>
 #include <semaphore.h>
 #include <setjmp.h>
@@ -186,8 +187,8 @@ static void *release_main(void *user) {
   return NULL;
 }
 
-/* Between the move to quarantine and the end of the row, the row names an object that is gone. Who finds that and waits
- * sees the row no more. */
+/* Between the move to quarantine and the end of the row, the row names an object that does not exist. A caller that
+ * finds this and waits no longer sees the row. */
 static void test_a_damaged_result_is_gone_after_settling(void **state) {
   stored *s = *state;
   healer h = {.s = s};

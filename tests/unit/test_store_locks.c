@@ -1,5 +1,5 @@
-/* Locks over several nodes: that of objects (publishing, excluding, lost connections, announced deletions), and that of
- * the schema. Several catalogues on one schema in PostgreSQL stand for nodes. Runs under
+/* Locks over several nodes: the lock of objects (publishing, excluding, lost connections, announced deletions) and the
+ * lock of the schema. Several catalogues on one schema in PostgreSQL stand for nodes. Runs under
  * tests/tools/with_postgresql.sh. */
 #include <pthread.h>
 #include <setjmp.h>
@@ -59,7 +59,7 @@ static void cut_lock(nodes *n) {
                    1);
 }
 
-/* Sets for how many ms the announcement stands. */
+/* Sets how long an announcement is valid, in ms. */
 static int set_until(database *db, void *argument) {
   char sql[80];
   snprintf(sql, sizeof sql, "UPDATE deletion SET until=clock_ms()+%lld", (long long)*(const int64_t *)argument);
@@ -75,7 +75,7 @@ static void test_publishing(void **state) {
   assert_int_equal(put_mesh(n, '1'), STORE_OK);
   cut_lock(n);
   assert_int_equal(put_mesh(n, '2'), STORE_LOST);
-  assert_true(object_lock_exclude(there)); /* what was published may be deleted now */
+  assert_true(object_lock_exclude(there)); /* published objects may be deleted now */
   object_lock_let_go(there);
   assert_int_equal(put_mesh(n, '2'), STORE_LOST);
   object_lock_unshare(here);
@@ -87,8 +87,8 @@ static void test_publishing(void **state) {
   object_lock_close(there);
 }
 
-/* A node that lost the lock after it had announced a deletion: its request may come to S3 late. Whoever publishes waits
- * for that, and a node without the lock announces nothing. */
+/* A node may lose the lock after it has announced a deletion: its request may come to S3 late. A node that publishes
+ * waits for that, and a node without the lock announces nothing. */
 static void test_announced_deletion(void **state) {
   enum { LEFT_MS = 400 };
   nodes *n = *state;
@@ -132,7 +132,7 @@ static void *publish(void *argument) {
   return NULL;
 }
 
-/* A thread that begins to share after the lock was lost takes it for itself, not for those before it. */
+/* A thread that begins to share after the lock was lost takes it for itself, not for the threads before it. */
 static void test_publishing_together(void **state) {
   nodes *n = *state;
   object_lock *lock = object_lock_open(n->url);
@@ -165,7 +165,7 @@ static void *exclude(void *argument) {
   return NULL;
 }
 
-/* A transaction that may have looked while the lock was held: it goes on until somebody waits for its end. */
+/* A transaction that may have read while the lock was held: it goes on until a caller waits for its end. */
 static int wait_within(database *db, void *argument) {
   excluder *e = argument;
   (void)db;
@@ -212,8 +212,8 @@ static void *open_node(void *user) {
   return NULL;
 }
 
-/* While a node runs that needs the older schema, a newer node starts neither on it nor migrates it. Once it has ended,
- * several may start at once, and one of them migrates. */
+/* While a node runs that needs the older schema, a newer node neither starts on it nor migrates it. After the older
+ * node has ended, several nodes may start at once, and one of them migrates. */
 static void test_older_schema(void **state) {
   char url[NODES_URL], mark[64];
   database old;

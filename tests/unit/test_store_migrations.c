@@ -1,4 +1,4 @@
-/* Catalogues of older versions in SQLite: what becomes of their rows. */
+/* Migrates catalogues of older versions in SQLite and checks their rows. */
 #include <setjmp.h>
 #include <sqlite3.h>
 #include <stdarg.h>
@@ -129,7 +129,7 @@ static int owns(stored *s, resource_kind kind, const char *id, const char *tenan
   return result == STORE_OK;
 }
 
-/* How many supermeshes the filter finds; each must be "both". */
+/* Returns how many supermeshes the filter finds; each must be "both". */
 static int found(stored *s, const char *view, const char *mesh, const char *name) {
   resource rows[2];
   int n = catalogue_list_some(s->cat, RESOURCE_SUPERMESH, view, &(list_filter){.mesh = mesh, .name = name}, 0, 2, rows);
@@ -198,7 +198,7 @@ static void test_migration_to_owners(void **state) {
   token_row *tokens = catalogue_tokens(s->cat, &count);
   assert_int_equal(count, 3);
   assert_string_equal(tokens[0].tenant, "ann");
-  assert_int_equal(tokens[0].used, 100); /* what it owns now, not all it ever uploaded */
+  assert_int_equal(tokens[0].used, 100); /* its present meshes, not all that it ever uploaded */
   assert_int_equal(tokens[0].quota, 100);
   assert_int_equal(tokens[1].used, 130);
   assert_int_equal(tokens[1].priority, 5);

@@ -1,5 +1,5 @@
-/* Moving a deployment from one data folder to another: all rows and objects, a move that goes on, and damage. Scenarios
- * move to PostgreSQL and S3 and back. */
+/* Moving a deployment from one data folder to another: all rows and objects, an interrupted move that continues, and
+ * damage. Scenarios move to PostgreSQL and S3 and back. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,11 +16,11 @@
 #include "store/object_removal.h"
 #include "store/owners.h"
 
-enum { MESHES = 230 }; /* more than a batch of rows, and than a page of objects */
+enum { MESHES = 230 }; /* more than a batch of rows and more than a page of objects */
 
 typedef struct two {
   char top[64], from[80], to[80];
-  int wrong;      /* objects that the listener was told of */
+  int wrong;      /* objects reported to the listener */
   char what[200]; /* the last one */
 } two;
 
@@ -111,7 +111,7 @@ static store_place place_at(const char *data) {
   return (store_place){.data = data, .bucket = {.keys = "", .authorities = ""}};
 }
 
-/* Opens a move and, if it runs, runs it. */
+/* Opens a move, and runs it if it opened. */
 static store_result go(two *s, int runs, int *goes_on, object_counts *counts) {
   const store_place from = place_at(s->from), to = place_at(s->to);
   const move_listener listener = {hear_rows, hear_objects, hear_wrong, s};
@@ -145,7 +145,7 @@ static void flip(const char *path) {
   assert_int_equal(fclose(file), 0);
 }
 
-/* Whether the target has these meshes, whole, and sums that match its rows. */
+/* Whether the target has these meshes, undamaged, and sums that match its rows. */
 static void check_target(const two *s, int meshes, int alignments) {
   objects *store;
   catalogue *cat;
@@ -184,7 +184,7 @@ static void test_all_is_moved(void **state) {
   assert_int_equal(counts.sent, MESHES + 1);
   assert_int_equal(s->wrong, 0);
   check_target(s, MESHES, 1);
-  assert_int_equal(go(s, 1, &goes_on, &counts), STORE_UNFIT); /* it is whole */
+  assert_int_equal(go(s, 1, &goes_on, &counts), STORE_UNFIT); /* it is not damaged */
   check_target(s, MESHES, 1);
 }
 
@@ -211,7 +211,7 @@ static void test_a_move_goes_on(void **state) {
   object_at(s->to, OBJECT_MESH, 7, path);
   assert_int_not_equal(access(path, F_OK), 0);
 
-  /* The source is repaired, one mesh is deleted there, and a bit flips in what was copied. */
+  /* Repairs the source, deletes one mesh there, and flips a bit in the copy. */
   object_at(s->from, OBJECT_MESH, 7, path);
   flip(path);
   open_place(s->from, &store, &cat);

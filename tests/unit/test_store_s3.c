@@ -1,5 +1,5 @@
-/* Objects in S3 without a server: signatures against examples that AWS published, URLs, keys, the bound of the cache.
- */
+/* Objects in S3 without a server: signatures compared with examples that AWS published, URLs, keys, the bound of the
+ * cache. */
 #include <fcntl.h>
 #include <limits.h>
 #include <netinet/in.h>
@@ -208,7 +208,8 @@ static int put_file(object_cache *cache, const char *folder, int i) {
   return fd;
 }
 
-/* A server that answers 403 to every signature more than 15 minutes from its time, as S3 does, and notes all. */
+/* A server that answers 403 to every signature more than 15 minutes from its time, as S3 does, and records all
+ * requests. */
 typedef struct fake_s3 {
   int listening, requests, accepted;
   int64_t now; /* Unix time */
@@ -243,7 +244,7 @@ static void *serve(void *user) {
   return NULL;
 }
 
-/* A clock of this machine that is a day ahead of S3's costs one request more, once; links have S3's time as well. */
+/* If the clock of this machine is a day ahead of S3's, one request is repeated, once; links have S3's time as well. */
 static void test_other_clock(void **state) {
   (void)state;
   fake_s3 f = {.listening = socket(AF_INET, SOCK_STREAM, 0), .now = (int64_t)time(NULL) - 86400};
@@ -280,7 +281,7 @@ static void test_other_clock(void **state) {
   assert_int_equal(f.accepted, 2);
 }
 
-/* What was used longest ago leaves, and the sum never exceeds the bound. */
+/* The entry that was used the longest time ago leaves, and the sum never exceeds the bound. */
 static void test_bound(void **state) {
   (void)state;
   char folder[] = "/tmp/orbmorph-cache-XXXXXX", path[PATH_MAX];
@@ -290,7 +291,7 @@ static void test_bound(void **state) {
   object_cache *cache = object_cache_open(folder, MOST);
   int first = put_file(cache, folder, 0);
   for (int i = 1; i < FILES; i++) {
-    usleep(2000); /* the time of reading has a step of a tick of the kernel */
+    usleep(2000); /* the time of reading has the resolution of a kernel tick */
     object_cache_used(first);
     close(put_file(cache, folder, i));
     int there = 0;

@@ -1,5 +1,5 @@
-/* The jobs of several nodes in PostgreSQL: claims in the order of fairness, leases, fencing, one flight a key, what
- * jobs wait for. Two catalogues on one schema stand for two nodes. Runs under tests/tools/with_postgresql.sh. */
+/* The jobs of several nodes in PostgreSQL: claims in the order of fairness, leases, fencing, one flight per key, and
+ * what jobs wait for. Two catalogues on one schema stand for two nodes. Runs under tests/tools/with_postgresql.sh. */
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -52,7 +52,7 @@ static store_result finish(nodes *n, int node, const job_claim *c, api_job_state
   return catalogue_job_finish(n->cat[node], c->row.id, c->row.attempt, &end);
 }
 
-/* A job that fails leaves no result to be owned. */
+/* A job that fails leaves no result that anyone could own. */
 static void end(nodes *n, int node, const job_claim *c) {
   assert_int_equal(finish(n, node, c, API_JOB_FAILED, "{}"), STORE_OK);
 }
@@ -65,7 +65,8 @@ static void test_order(void **state) {
   submit(n, 0, "ann", '2', 3, &rows[1]); /* more urgent */
   submit(n, 1, "bob", '3', 0, &rows[2]);
   submit(n, 1, "eve", '4', 8, &rows[3]); /* of a higher class */
-  const int order[] = {3, 1, 2, 0};      /* class, ann's most urgent; then bob, who had nothing yet; then ann again */
+  const int order[] = {3, 1, 2,
+                       0}; /* the class first, and ann's most urgent; then bob, who had nothing yet; then ann again */
   for (int i = 0; i < 4; i++) {
     assert_int_equal(claim(n, i % 2, &c), STORE_OK);
     assert_string_equal(c.row.id, rows[order[i]].id);
@@ -81,7 +82,7 @@ static int began_earlier(database *db, void *ms) {
   return database_run(db, st);
 }
 
-/* Ends a job that its worker has had for so long. */
+/* Ends a job that its worker has had for this long. */
 static void end_after(nodes *n, int node, const job_claim *c, int64_t ms) {
   assert_int_equal(catalogue_write(n->cat[node], began_earlier, &ms), STORE_OK);
   end(n, node, c);
@@ -93,7 +94,7 @@ static void claim_of(nodes *n, int node, const char *owner, job_claim *c) {
   assert_string_equal(c->row.owner, owner);
 }
 
-/* Turns go by the time that jobs took, not by what was estimated: both owners' jobs have the same cost. */
+/* Turns depend on the time that jobs took, not on the estimate: both owners' jobs have the same cost. */
 static void test_time_counts(void **state) {
   enum { MINUTE = 60000 };
   nodes *n = *state;
@@ -114,7 +115,7 @@ static void test_time_counts(void **state) {
   claim_of(n, 0, "ann", &c);
 }
 
-/* An owner that comes while a job of another has run for an hour is not an hour ahead. */
+/* An owner that comes after a job of another has run for an hour is not an hour ahead. */
 static void test_start_level(void **state) {
   enum { MINUTE = 60000 };
   int64_t hour = 60 * MINUTE;
@@ -128,12 +129,12 @@ static void test_start_level(void **state) {
   submit(n, 1, "bob", '3', 0, &row);
   submit(n, 1, "bob", '4', 0, &row);
   end_after(n, 0, &long_one, MINUTE);
-  claim_of(n, 1, "bob", &c); /* who began level with ann, when she had used an hour */
+  claim_of(n, 1, "bob", &c); /* bob began level with ann, when she had used an hour */
   end_after(n, 1, &c, 2 * MINUTE);
   claim_of(n, 1, "ann", &c);
 }
 
-/* A worker that is kept for small jobs finds one behind any number of large ones. */
+/* A worker that is reserved for small jobs finds one behind any number of large jobs. */
 static void test_small_behind_large(void **state) {
   enum { LARGE_JOBS = 90, LARGE_COST = 1000000, SMALL_COST = 10 };
   nodes *n = *state;
@@ -195,8 +196,8 @@ static void test_limits(void **state) {
   assert_int_equal(room, 480);
 }
 
-/* What a node ran that is silent beyond its lease, another one runs; the first one can then neither end nor release it.
- */
+/* If a node is silent beyond its lease, another node runs its jobs; the first one can then neither end nor release
+ * them. */
 static void test_lease(void **state) {
   nodes *n = *state;
   job_row row, got;
@@ -258,7 +259,7 @@ static void test_own_last_life(void **state) {
   assert_int_equal(catalogue_recover_own(n->cat[0], node_names[0]), STORE_OK);
   assert_int_equal(claim(n, 1, &c), STORE_OK);
   assert_int_equal(c.row.suspect, 0);
-  assert_int_equal(claim(n, 1, &c), STORE_NOT_FOUND); /* what the other node runs stays */
+  assert_int_equal(claim(n, 1, &c), STORE_NOT_FOUND); /* the other node's jobs stay */
 }
 
 static int is_waiting(nodes *n, const char *id, job_mark *mark) {
@@ -306,7 +307,8 @@ static void test_needs(void **state) {
   assert_int_equal(whole.row.attempt, 1);
 }
 
-/* A supermesh is claimed to see what it lacks: callers see it run once it has begun, or once what it lacks runs. */
+/* A supermesh is claimed to find out what it lacks: callers see that it runs once it has begun, or once the job for
+ * what it lacks runs. */
 static void test_begin(void **state) {
   nodes *n = *state;
   job_row row = {.kind = API_JOB_SUPERMESH, .listed = 1, .cost = 12, .created = 1, .owner = "ann"};

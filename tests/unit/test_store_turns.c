@@ -1,5 +1,5 @@
-/* Whose job runs next: owners are charged for the time of workers, measured, not for the size of their meshes. The
- * clock of a running job is set back to stand for time that has passed. */
+/* Whose job runs next: owners are charged for the measured time of workers, not for the size of their meshes. The clock
+ * of a running job is set back to stand for elapsed time. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -58,7 +58,7 @@ static void end_after(queue *q, job *j, int64_t ms) {
   queue_finish(q, j, API_JOB_CANCELLED, NULL);
 }
 
-/* Every mesh is as large as the others, but those of one owner take ten times as long. */
+/* All meshes have the same size, but those of one owner take ten times as long. */
 static void test_time_decides(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 1);
@@ -78,7 +78,7 @@ static void test_time_decides(void **state) {
   queue_destroy(q);
 }
 
-/* A huge mesh that is done at once costs its owner what it took, not what was expected. */
+/* A huge mesh that is done at once costs its owner the time that it took, not the estimate. */
 static void test_measure_replaces_estimate(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 1);
@@ -94,7 +94,7 @@ static void test_measure_replaces_estimate(void **state) {
   queue_destroy(q);
 }
 
-/* While a job runs its owner pays at least the estimate, and more as soon as it has taken more. */
+/* While a job runs, its owner pays at least the estimate, and more as soon as the job has taken longer. */
 static void test_running_jobs_count(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 4);
@@ -114,7 +114,7 @@ static void test_running_jobs_count(void **state) {
   queue_destroy(q);
 }
 
-/* An owner has at most its share of the workers while another waits, however little it has used before. */
+/* While another owner waits, an owner has at most its share of the workers, however little it has used before. */
 static void test_share(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 2);
@@ -135,7 +135,7 @@ static void test_share(void **state) {
   queue_destroy(q);
 }
 
-/* An owner that pauses saves up no turns: it comes back level with the least served. */
+/* An owner that pauses saves no turns: it comes back level with the least served owner. */
 static void test_pauses_earn_nothing(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 1);
@@ -156,7 +156,7 @@ static void test_pauses_earn_nothing(void **state) {
   queue_destroy(q);
 }
 
-/* A job that is given back has cost its owner the time that it had a worker. */
+/* A job that is given back costs its owner the time that it had a worker. */
 static void test_given_back(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 1);
@@ -198,11 +198,11 @@ static void test_guests_pass_a_suspect(void **state) {
 enum { MANY = 5, FEW = 2, MANY_MS = 20 };
 
 typedef struct noted {
-  task task; /* first: a task is the note */
+  task task; /* the first member: its address is that of the struct */
   int ms, *next, at;
 } noted;
 
-/* Without isolation a suspect is alone, and is not a guest: as a guest it would keep all others out after its end. */
+/* Without isolation a suspect runs alone and is not a guest: as a guest it would keep all others out after its end. */
 static void test_a_suspect_is_no_guest(void **state) {
   stored *s = *state;
   queue *q = open_queue(s, 2);
@@ -227,14 +227,14 @@ static void note(task *t) {
   sleep_ms(n->ms);
 }
 
-/* Checks of uploads: an owner whose checks take long does not hold up all that another one sends. */
+/* Checks of uploads: an owner whose checks take long does not delay all uploads of another owner. */
 static void test_tasks_take_turns(void **state) {
   (void)state;
   int next = 0;
   noted many[MANY], few[FEW], one = {.task = {.run = note, .owner = 3}, .ms = 5 * MANY_MS, .next = &next};
   tasks *pool = tasks_start(1, NULL);
   assert_non_null(pool);
-  tasks_add(pool, &one.task); /* keeps the thread until all are there */
+  tasks_add(pool, &one.task); /* occupies the thread until all tasks are added */
   for (int i = 0; i < MANY; i++) {
     many[i] = (noted){.task = {.run = note, .owner = 1}, .ms = MANY_MS, .next = &next};
     tasks_add(pool, &many[i].task);
@@ -269,8 +269,8 @@ static void weigh(task *t) {
   __atomic_sub_fetch(h->in_use, t->memory, __ATOMIC_SEQ_CST);
 }
 
-/* All tasks that run at once, of all pools together, stay within the memory of their part. One for which there is none
- * lets others pass. */
+/* All tasks that run at once, in all pools together, stay within the memory of their part. A task for which there is no
+ * memory lets others pass. */
 static void test_tasks_share_memory(void **state) {
   (void)state;
   static const int64_t needs[] = {60, 60, 40, 60, 40, 100, 40, 40};
@@ -302,7 +302,7 @@ static void test_tasks_share_memory(void **state) {
   memory = budget_create(200);
   assert_non_null(memory);
 
-  /* Beside what takes its part whole, another part still has room, and a smaller task passes a larger one. */
+  /* Beside a task that takes a whole part, another part still has room, and a smaller task passes a larger one. */
   most = 0;
   assert_true(budget_take(memory, BUDGET_CHECKS, 70));
   assert_false(budget_take(memory, BUDGET_CHECKS, 31));
@@ -323,7 +323,7 @@ static void test_tasks_share_memory(void **state) {
   budget_destroy(memory);
 }
 
-/* What a file is expected to need. */
+/* The estimate for a file. */
 static void test_memory_of_files(void **state) {
   (void)state;
   memory_budget *memory = budget_create(INT64_C(4) << 30);
@@ -346,7 +346,7 @@ static void count_call(void *user) {
   ++*(int *)user;
 }
 
-/* Listeners hear of memory that someone asked for in vain, once for each time, and of no other. */
+/* Listeners are told of memory that a task requested in vain, once for each request, and of no other memory. */
 static void test_listeners(void **state) {
   (void)state;
   int calls = 0;

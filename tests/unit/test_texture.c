@@ -1,6 +1,5 @@
-/* Textures of glTF files: valid pictures are kept, data that only starts like one is dropped, samplers have valid
- * values.
- */
+/* Textures of glTF files: valid pictures are kept, data that only begins like a picture is dropped, samplers have valid
+ * values. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -33,7 +32,7 @@ static int type_is(const unsigned char *bytes, size_t size, const char *type) {
   return type ? got && strcmp(got, type) == 0 : !got;
 }
 
-/* The type after one byte was changed. */
+/* The detected type after one byte was changed. */
 static int changed_is(const unsigned char *bytes, size_t size, size_t at, unsigned char value, const char *type) {
   unsigned char copy[128];
   memcpy(copy, bytes, size);
@@ -113,7 +112,7 @@ static void test_jpeg(void **state) {
   assert_true(type_is(junk, sizeof junk, NULL));
 }
 
-/* A copy of an image with a part put in at `at`, and what remains of it once it is stripped. */
+/* A copy of an image with a part inserted at `at`, and the image after it is stripped. */
 static size_t stripped(const unsigned char *image, size_t size, size_t at, const char *part, size_t length,
                        unsigned char *out) {
   memcpy(out, image, at);
@@ -123,7 +122,8 @@ static size_t stripped(const unsigned char *image, size_t size, size_t at, const
   return orb_image_strip(out, size + length);
 }
 
-/* Colour chunks go, others stay, and so does an image without any. The sums of chunks are not read here. */
+/* Stripping removes colour chunks and keeps the others, and leaves an image without colour chunks unchanged. It does
+ * not check the checksums of chunks. */
 static void test_profiles_are_stripped(void **state) {
   (void)state;
   static const struct {
@@ -202,7 +202,7 @@ static void test_junk_is_left_out(void **state) {
   assert_string_equal(mesh.images[0].mime, "image/png");
   orb_mesh_free(ctx, &mesh);
   read_textured(JPEG, sizeof JPEG, "{}", &mesh);
-  assert_string_equal(mesh.images[0].mime, "image/jpeg"); /* whatever the file calls it */
+  assert_string_equal(mesh.images[0].mime, "image/jpeg"); /* whatever type the file states */
   orb_mesh_free(ctx, &mesh);
   read_textured(PNG, PNG_IDAT, "{}", &mesh);
   assert_int_equal(mesh.image_count, 0);
@@ -220,7 +220,7 @@ static void test_samplers(void **state) {
   assert_int_equal(mesh.materials[0].base_texture.mag_filter, 9728);
   assert_int_equal(mesh.materials[0].base_texture.min_filter, 9987);
   orb_mesh_free(ctx, &mesh);
-  /* 98607 is 33071 + 65536; a filter with mipmaps is none for magnification */
+  /* 98607 is 33071 + 65536; a filter with mipmaps is not valid for magnification */
   read_textured(PNG, sizeof PNG, "{\"wrapS\":5,\"wrapT\":98607,\"magFilter\":9984,\"minFilter\":77}", &mesh);
   assert_int_equal(mesh.image_count, 1);
   assert_int_equal(mesh.materials[0].base_texture.wrap_s, 0);

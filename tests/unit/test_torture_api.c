@@ -49,7 +49,7 @@ static int through_embedding(const cJSON *value, api_text *out, api_problem *pro
   return fine;
 }
 
-/* A refusal, written as its document. */
+/* The document of a refusal. */
 static int through_refusal(const cJSON *value, api_text *out, api_problem *problem) {
   int fine = through_supermesh(value, out, problem);
   if (!fine) {

@@ -178,9 +178,9 @@ static void test_embed(void **state) {
   all_fail(&f->w, embed_run, "kernel-sampling", 10, 2, 1, LONG_MAX, 1);
 }
 
-/* The first way fails every allocation. Those after it fail what differs: their alignment, unless the way before has
- * the same, and their remeshing; what follows makes the same allocations for every supermesh. Alignment without
- * landmarks is slow: fails a sample of the allocations, all of them with ORB_TORTURE_ALL=1. */
+/* The first method fails every allocation. The later ones fail the allocations that differ: their alignment, unless the
+ * previous method has the same, and their remeshing; the rest makes the same allocations for every supermesh. Alignment
+ * without landmarks is slow: fails a sample of the allocations, all of them with ORB_TORTURE_ALL=1. */
 static void test_merge(void **state) {
   int all = getenv("ORB_TORTURE_ALL") != NULL;
   fixture *f = *state;
@@ -213,7 +213,7 @@ static void put(orb_buffer *file, const void *bytes, size_t size, orb_context *c
   assert_int_equal(orb_buffer_append(ctx, file, bytes, size), ORB_OK);
 }
 
-/* The tetrahedron in each text format; what was merged as GLB, a sphere as binary PLY. */
+/* The tetrahedron in each text format; a merge result as GLB, a sphere as binary PLY. */
 static void test_read(void **state) {
   fixture *f = *state;
   static const char *const texts[][2] = {

@@ -123,7 +123,7 @@ static void read_lists(stored *s, const told *t) {
   free(tokens);
 }
 
-/* Sends what is due, all to one receiver: STORE_OK if the job's message was among it and is recorded. */
+/* Sends all due messages, all to one receiver: STORE_OK if the job's message was among them and is recorded. */
 static store_result deliver(stored *s, const char *job) {
   store_result result = STORE_NOT_FOUND;
   for (int turn = 0; turn < 8 && result == STORE_NOT_FOUND; turn++) {

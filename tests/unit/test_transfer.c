@@ -153,8 +153,9 @@ static void a_shape_on_itself_has_no_error(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* An octahedron that stands for a fine ball: the ball's farthest points lie over the middles of the faces, 1 − 1/√3
- * away; the rms lies between what the faces' distances allow; normals differ most at the corners, by acos(1/√3). */
+/* An octahedron that represents a fine ball: the ball's farthest points lie over the middles of the faces, 1 − 1/√3
+ * away; the rms lies within the range that the faces' distances allow; normals differ most at the corners, by
+ * acos(1/√3). */
 static void an_octahedron_for_a_ball(void **state) {
   orb_context *ctx = *state;
   synthetic fine = synthetic_make(ctx, 5, 1, same), coarse = synthetic_make(ctx, 0, 1, same);
@@ -184,8 +185,8 @@ static void bumpy(int32_t shape, const double p[3], double out[3]) {
   }
 }
 
-/* Where a bound is proved, samples are fewer: the figures stay within a few per cent of those of all samples, and the
- * sampled distance stays below that of all. */
+/* If a bound is proved, fewer samples are taken: the figures stay within a few per cent of those of all samples, and
+ * the sampled distance is at most that of all. */
 static void a_bound_needs_fewer_samples(void **state) {
   orb_context *ctx = *state;
   synthetic fine = synthetic_make(ctx, 6, 1, bumpy), coarse = synthetic_make(ctx, 4, 1, bumpy);

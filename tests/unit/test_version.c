@@ -1,4 +1,4 @@
-/* One version: of the build, in the headers, and in the library. */
+/* The build, the headers and the library have the same version. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,5 +1,5 @@
-/* Warnings of a report, on tubes whose maps are known: where they are, how much of the area they have, and where there
- * are none. */
+/* Warnings of a report, on tubes whose maps are known: their places, their shares of the area, and maps without
+ * warnings. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -24,7 +24,7 @@ static const orb_warn_pair tubes = {triangles, TRIANGLES, VERTICES, {position[0]
 
 typedef double (*profile)(double z);
 
-/* Two tubes of radius 1 along z. On the second, the ring at z lies at length(z), turned by turn(z). */
+/* Two tubes of radius 1 along z. On the second, the ring at z is moved to length(z) and rotated by turn(z). */
 static void make_tubes(profile length, profile turn) {
   for (int i = 0; i < RINGS; i++) {
     double z = LENGTH * i / (RINGS - 1);
@@ -80,7 +80,7 @@ static void lengthen(double by, double share, double first, double second) {
   make_tubes(bands, none);
 }
 
-/* Scaled to the same area, a band lengthened by k has σ² = r and r k², r the ratio of the areas. */
+/* After scaling to the same area, a band lengthened by k has σ² = r and r k², where r is the ratio of the areas. */
 static double band_energy(double k, double area) {
   double r = 1 / area;
   return 0.25 * (r + 1 / r + r * k * k + 1 / (r * k * k));
@@ -117,7 +117,8 @@ static void test_bands(void **state) {
   assert_true(warning.parts[0].centre[0][2] * warning.parts[1].centre[0][2] < 7.3 * 1.3); /* not twice the same */
 }
 
-/* Half a per cent of the first shape and a twentieth of the second: a limb that grew counts on the shape it grew on. */
+/* Half a per cent of the first shape and a twentieth of the second: a limb that grew counts on the shape on which it is
+ * large. */
 static void test_either_shape(void **state) {
   (void)state;
   orb_warning warning = {0};
@@ -154,7 +155,7 @@ static void test_twist(void **state) {
   }
 }
 
-/* A motion of the whole makes nothing thin once it is undone: here half a turn around z. */
+/* A motion of the whole shape makes nothing thin once it is undone: here half a turn around z. */
 static void test_moved(void **state) {
   (void)state;
   static const double turned[16] = {-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -173,12 +174,12 @@ static void test_moved(void **state) {
   assert_int_equal(warning.part_count, 0);
 }
 
-/* Turns the far half by 60°: it keeps √3/2 of its width halfway, more than half. */
+/* Rotates the far half by 60°: it keeps √3/2 of its width halfway, more than half. */
 static double turned_by_60(double z) {
   return z > LENGTH / 2 ? M_PI / 3 : 0;
 }
 
-/* Nor do files in other units: a copy that is 100 times as large, scaled back by the motion. */
+/* Files in other units make nothing thin either: a copy that is 100 times as large, scaled back by the motion. */
 static void test_units(void **state) {
   (void)state;
   static const double back[16] = {0.01, 0, 0, 0, 0, 0.01, 0, 0, 0, 0, 0.01, 0, 0, 0, 0, 1};
@@ -193,8 +194,7 @@ static void test_units(void **state) {
   assert_int_equal(warning.part_count, 0);
 }
 
-/* A band that the map draws 400 times as long consists of needles there, and of no needles where it came from.
- */
+/* A band that the map stretches to 400 times its length consists of needles there, and of none where it came from. */
 static void test_needles_of_one_shape(void **state) {
   (void)state;
   static orb_place places[2 * VERTICES];
