@@ -26,6 +26,18 @@ fi
 export PKG_CONFIG_PATH="$prefix/$LIBDIR/pkgconfig"
 pkg-config --exact-version="$ORB_PROJECT_VERSION" orbmorph || fail "orbmorph.pc has another version than the project"
 
+# pkg-config refuses orbmorph.pc if a file that it requires is missing, so liborbmorph-dev depends on the packages of all
+# of them. Left out where these packages have other names.
+packages=$(sed -n 's/.*CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "\(.*\)").*/\1/p' "$ORB_BUILD/CPackConfig.cmake" |
+  grep -o '[^ ,]*-dev')
+mkdir "$scratch/required"
+# shellcheck disable=SC2086 # words
+if dpkg-query -L $packages >"$scratch/required/files" 2>/dev/null; then
+  grep '\.pc$' "$scratch/required/files" | xargs cp -t "$scratch/required"
+  PKG_CONFIG_LIBDIR="$scratch/required" pkg-config --print-errors --exists orbmorph ||
+    fail "liborbmorph-dev depends on too few packages: $packages"
+fi
+
 # Shared, C17.
 # shellcheck disable=SC2046 # words
 "$CC" -std=c17 -Wall -Wextra -Wpedantic -Werror "$tree/docs/library/morph.c" $(pkg-config --cflags --libs orbmorph) \

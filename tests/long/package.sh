@@ -87,7 +87,8 @@ inside su -s /bin/sh orbmorph -c 'orbmorphd --check-data --data /var/lib/orbmorp
 inside apt-get install -qq -y --no-install-recommends /root/liborbmorph1.deb /root/liborbmorph-dev.deb gcc libc6-dev pkg-config \
   >"$at/install.log" 2>&1 || { cat "$at/install.log"; exit 1; }
 inside sh -c 'cc -std=c17 /usr/share/doc/liborbmorph-dev/morph.c $(pkg-config --cflags --libs orbmorph) -o /root/morph'
-inside apt-get purge -qq -y liborbmorph-dev libqhull-dev libcjson-dev libmeshoptimizer-dev libdraco-dev zlib1g-dev libexpat1-dev >"$at/remove.log" 2>&1
+# shellcheck disable=SC2046 # words
+inside apt-get purge -qq -y liborbmorph-dev $(dpkg-deb -f "$debian/root/liborbmorph-dev.deb" Depends | grep -o '[^ ,]*-dev') >"$at/remove.log" 2>&1
 inside apt-get autoremove -qq -y >>"$at/remove.log" 2>&1
 inside /root/morph /root/dog.obj /root/giraffe.off >"$at/library.glb"
 [ "$(head -c 4 "$at/library.glb")" = glTF ]
@@ -98,5 +99,8 @@ inside apt-get remove -qq -y orbmorph >>"$at/remove.log" 2>&1
 inside apt-get purge -qq -y orbmorph >>"$at/remove.log" 2>&1
 left=$(find "$debian" -xdev -name '*orbmorph*' -not -path '*/root/*' -not -path '*/var/log/*')
 [ -z "$left" ] || { echo "a purge leaves: $left"; exit 1; }
-! grep -q orbmorph "$debian/etc/passwd" "$debian/etc/group"
+if grep orbmorph "$debian/etc/passwd" "$debian/etc/group"; then
+  echo "a purge leaves its user or group"
+  exit 1
+fi
 echo "the packages install, run, and leave nothing"
