@@ -10,7 +10,7 @@ import { gzipSync, createGzip } from 'node:zlib';
 import { Daemon, assertProblem, binaries, daemon, patience, slow, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-/** Sends bytes as they are; resolves to all that comes until the other side closes or some seconds are over. */
+/** Sends bytes unchanged; resolves to everything received until the other side closes or some seconds have passed. */
 function raw(d, bytes, seconds = 60) {
   return new Promise((resolve) => {
     const { hostname, port } = new URL(d.url);
@@ -139,7 +139,7 @@ test('a gigabyte of zeros, compressed', async (t) => {
     assert.ok([400, 413].includes(reply.status), `${reply.status} ${reply.bytes}`);
     assert.equal(reply.type, 'application/problem+json');
   }
-  // A bomb within a bomb is one layer too many.
+  // A bomb inside a bomb has one layer too many.
   const twice = await d.request('POST', '/v1/meshes', {
     body: gzipSync(zeros),
     headers: { 'content-encoding': 'gzip, gzip' },
@@ -192,7 +192,7 @@ test('wrong tokens, and what a token sees', async (t) => {
     const reply = await d.delete(`/v1/meshes/${'a'.repeat(64)}`, { headers: as(token) });
     assertProblem(reply, token === reader ? 403 : 401, token === reader ? 'forbidden' : 'unauthorized');
   }
-  // Without a token nothing tells whether a thing is there.
+  // Without a token, no answer shows whether a thing exists.
   const there = (await (await upload(writer)).json).id;
   const [known, unknown] = [await d.get(`/v1/meshes/${there}`), await d.get(`/v1/meshes/${'b'.repeat(64)}`)];
   assert.equal(known.status, 401);

@@ -34,7 +34,10 @@ const along = (triangle, weights, positions) =>
 const place = ({ triangle, barycentric }, { triangles, positions }) =>
   along(triangles[triangle], barycentric, positions);
 
-/** How far apart a morph takes a place on the first shape and a place on the second, from the vertex next to the first. */
+/**
+ * The distance between a place on the first shape and a place on the second in the morph, from the vertex next to the
+ * first.
+ */
 async function gap(d, supermesh, from, to) {
   const { shapes, count } = morphOf((await d.get(supermesh.asset)).bytes);
   const at = (s, v) => shapes[s].slice(3 * v, 3 * v + 3);
@@ -73,7 +76,7 @@ test('the request of an alternative is answered, with another map', async (t) =>
   assert.notEqual(other.id, first.id);
   assert.equal(other.match, undefined);
   assert.deepEqual(other.alternatives, []);
-  // The landmarks are met, and the first map takes one of them elsewhere.
+  // The landmarks are met; the first map maps one of them elsewhere.
   assert.equal(other.landmarks.length, alternatives[0].request.landmarks.length);
   for (const l of other.landmarks) for (const r of l.residual_relative) assert.ok(r < 1e-6, `${l.name}: ${r}`);
   // A kept alignment has the same verdict and alternatives.
@@ -106,7 +109,7 @@ test('of three shapes, an alternative matches one otherwise and leaves the other
   const reply = await d.post('/v1/supermeshes', request, { headers: { prefer: 'wait=60' } });
   assert.equal(reply.status, 200, reply.bytes.toString());
   for (const l of reply.json.landmarks) for (const r of l.residual_relative) assert.ok(r < 1e-6, `${l.name}: ${r}`);
-  // The first map takes the places of the other shapes nearly together, and some of the one shape elsewhere.
+  // The first map maps the places of the other shapes nearly to each other, and some places of the one shape elsewhere.
   const { shapes: found, count } = morphOf((await d.get(first.asset)).bytes);
   const at = (s, v) => found[s].slice(3 * v, 3 * v + 3);
   const apart = (p, q) => Math.hypot(...p.map((x, k) => x - q[k]));

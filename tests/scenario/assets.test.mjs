@@ -1,4 +1,4 @@
-// The asset as clients get it: caching, ranges, the Khronos validator, three.js.
+// The asset as clients receive it: caching, ranges, the Khronos validator, three.js.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -62,7 +62,8 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
   const beyond = await d.get(supermesh.asset, headers(`bytes=${n}-`));
   assert.equal(beyond.status, 416);
   assert.equal(beyond.headers.get('content-range'), `bytes */${n}`);
-  // Several ranges, and what is not a range of bytes, are answered with all of it, as RFC 9110 allows.
+  // Requests for several ranges, or for something that is not a range of bytes, get the whole asset, as RFC 9110
+  // allows.
   for (const range of [
     'bytes=0-1,3-4',
     'bytes=5-2',

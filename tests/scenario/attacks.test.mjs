@@ -33,7 +33,7 @@ async function bearer(d, name) {
   return { authorization: `Bearer ${stdout.trim()}` };
 }
 
-/** How many times slower than alone a thread is now, because of what else runs on this machine. */
+/** How many times slower a thread is now than alone, because of other work on this machine. */
 function busy() {
   const [began, before] = [performance.now(), process.cpuUsage()];
   let used;
@@ -44,7 +44,7 @@ function busy() {
 }
 
 let made = 0;
-/** What the other tenant does: an upload and its embedding. Returns the milliseconds until both are there. */
+/** The work of the other tenant: an upload and its embedding. Returns the milliseconds until both exist. */
 async function small(d, headers) {
   const began = performance.now();
   const n = ++made;
@@ -177,7 +177,7 @@ test('jobs whose processes die', async (t) => {
   await beside(t, d, other, async () => {
     for (let death = 1; death <= 3; death++) {
       await until(async () => (await now()).attempt === death && (await now()).stage === 'embed', 'it runs', 60);
-      // Those of the other tenant end within a second: the process that stays is this job's.
+      // The processes of the other tenant end within a second: the process that stays is this job's.
       const there = workers(d);
       await sleep(1000);
       [pid] = workers(d).filter((each) => there.includes(each));

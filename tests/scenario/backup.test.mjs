@@ -1,4 +1,4 @@
-// Backups of a data folder that a daemon serves, and what is restored from them.
+// Backs up a data folder that a daemon serves, and checks what is restored.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { createHash } from 'node:crypto';
@@ -60,7 +60,7 @@ test('a backup under load is restored with the same bytes', async (t) => {
   busy = false;
   await load;
 
-  // Again into the same folder: what was deleted goes, what is new comes, all else stays.
+  // Again into the same folder: deleted entries leave, new ones arrive, all others stay.
   const [gone] = accepted.pop();
   assert.equal((await d.delete(`/v1/meshes/${gone}`)).status, 204);
   const file = object(backup, 'mesh', a.json.id);
@@ -162,7 +162,7 @@ test('a backup and a restore refuse what they would overwrite, and report damage
   assert.match(again.out, new RegExp(`^mesh ${a.id}: its object does not match its hash$`, 'm'));
   assert.equal(readFileSync(object(backup, 'mesh', a.id), 'utf8'), mesh(0));
 
-  // Nor is a damaged object of the backup restored; all else is.
+  // A damaged object of the backup is not restored either; all others are.
   const lost = object(backup, 'mesh', b.id);
   rmSync(lost);
   writeFileSync(lost, 'v 0 0 0\n');

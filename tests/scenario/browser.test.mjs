@@ -1,5 +1,5 @@
-// The browser as an attacker: what a page of another site can send to a daemon that needs no token. fetch() sets Host and
-// Origin itself, so these requests are made by hand, as a browser would make them for such a page.
+// The browser as an attacker: what a page of another site can send to a daemon that needs no token. fetch() sets Host
+// and Origin itself, so this test writes the requests by hand, as a browser would send them for such a page.
 import assert from 'node:assert/strict';
 import http from 'node:http';
 import net from 'node:net';
@@ -149,7 +149,7 @@ test('an element of a foreign page does not make the daemon work', async (t) => 
   const d = await daemon(t);
   const site = { 'sec-fetch-site': 'cross-site' };
   assertProblem(await send(d, 'GET', '/v1/meshes', { ...site, 'sec-fetch-mode': 'no-cors' }), 403, 'foreign-origin');
-  // A link that a user follows is a navigation, and what the user types has no site.
+  // A link that a user follows is a navigation; an address that the user types has no site.
   for (const headers of [
     { ...site, 'sec-fetch-mode': 'navigate' },
     { 'sec-fetch-site': 'none', 'sec-fetch-mode': 'navigate' },
@@ -195,7 +195,7 @@ test('unknown parameters of a query are refused by name, on every route', async 
       const reply = await ask('vertices=1');
       assertProblem(reply, 400, 'bad-query', `${verb} ${target}`);
       assert.equal(reply.json.parameter, 'vertices');
-      // What the document describes is known, once, and with a value.
+      // Parameters in the document are accepted, once each and with a value.
       for (const p of (item[verb].parameters ?? []).map(resolve).filter((p) => p.in === 'query')) {
         if (p.name === 'signature') continue; // an invalid one is refused before the query is read
         const twice = await ask(`${p.name}=1&${p.name}=1`);

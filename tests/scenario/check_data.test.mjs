@@ -1,4 +1,4 @@
-// Damage to a data folder: what --check-data finds and says, and what the service does with it.
+// Damage to a data folder: what --check-data finds and prints, and what the service does about it.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { copyFileSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';

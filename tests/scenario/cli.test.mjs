@@ -264,7 +264,7 @@ test('nothing is uploaded before the options were checked and the output was tri
   assert.equal((await run(['embed', dog, '-o', path.join(at, 'none/x.ply')], { env })).code, 2);
   assert.deepEqual((await d.get('/v1/meshes')).json.meshes, []);
   assert.deepEqual(await readdir(at), ['one.json'], 'trying leaves nothing behind');
-  // An output that exists keeps its bytes until the new ones are there; a device is written to, and stays one.
+  // An existing output keeps its bytes until the new ones are complete; a device is written to and stays a device.
   const kept = path.join(at, 'kept.glb');
   await writeFile(kept, 'old');
   const ring = path.join(at, 'ring.obj');
@@ -498,7 +498,7 @@ test('a report warns of what is worse than asked, and only of that', async (t) =
   const env = { ORBMORPH_SERVER: d.url };
   const at = await folder(t);
   const [report, tall, marks] = ['report.md', 'tall.obj', 'marks.json'].map((name) => path.join(at, name));
-  // A dog that is a fifth taller: the map to it is good, however few triangles the dog has.
+  // A dog that is a fifth taller: the map to it is good, although the dog has few triangles.
   const taller = (line) => line.replace(/^v (\S+) (\S+)/, (_, x, y) => `v ${x} ${1.2 * y}`);
   await writeFile(tall, (await readFile(dog, 'utf8')).split('\n').map(taller).join('\n'));
   const list = JSON.parse(await readFile(landmarks, 'utf8')).landmarks;

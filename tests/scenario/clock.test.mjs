@@ -1,4 +1,4 @@
-// The wall clock is set back or ahead by an hour while the daemon runs, as happens when machines boot.
+// The wall clock jumps back or ahead by an hour while the daemon runs, as happens when machines boot.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import net from 'node:net';

@@ -13,7 +13,7 @@ const unpack = {
   zstd: (bytes) => execFileSync('zstd', ['-d', '-q', '-c'], { input: bytes, maxBuffer: 1 << 28 }),
 };
 
-/** Bytes as they are sent: fetch() unpacks them. */
+/** The bytes on the wire: fetch() unpacks them. */
 const send = (d, target, headers = {}, method = 'GET', body) =>
   new Promise((resolve, reject) => {
     const r = http.request(new URL(target, d.url), { method, headers }, (reply) => {
@@ -83,7 +83,7 @@ test('every answer that can be compressed is the same in every coding', async (t
       assert.equal(other.status, 200, 'the tag of another coding is not this one');
     }
   }
-  // Uploaded files and places stay as they are.
+  // Uploaded files and places are not compressed.
   for (const target of [`/v1/meshes/${ids[0]}/file`, `${supermesh.url}/places`]) {
     const reply = await send(d, target, accept('gzip, zstd'));
     assert.deepEqual([reply.status, reply.headers['content-encoding']], [200, undefined]);
@@ -154,7 +154,7 @@ test('small answers, and a daemon without room for them, are not compressed', as
   assert.deepEqual([small.headers['content-encoding'], small.headers.vary], [undefined, undefined]);
   const off = await daemon(t, { args: ['--encoded-bytes', '0'] });
   assert.equal((await send(off, '/openapi.json', accept('gzip'))).headers['content-encoding'], undefined);
-  // With room for little, answers are dropped and compressed again.
+  // If the cache has little room, answers are dropped and compressed again.
   const tight = await daemon(t, { args: ['--encoded-bytes', '1K'] });
   for (let i = 0; i < 3; i++)
     for (const target of ['/openapi.json', '/docs.js']) {
@@ -183,7 +183,7 @@ test('an asset from memory is the same answer as from its file', async (t) => {
           seen.push(reply);
         }
     answers.push(seen);
-    // Headers come once: a repeated one would be joined here.
+    // Headers appear once: a repeated one would be joined here.
     assert.equal(seen[0].headers['content-type'], 'model/gltf-binary');
     assert.equal(seen[0].headers.vary, 'Accept-Encoding');
     assert.equal(seen[0].bytes.length, supermesh.asset_bytes);

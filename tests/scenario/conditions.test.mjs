@@ -6,7 +6,7 @@ import test from 'node:test';
 import { assertProblem, daemon, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-/** fetch joins the lines of a header; here each stays one. */
+/** fetch joins the lines of a header; here each line stays separate. */
 function lines(d, method, target, headers, body) {
   return new Promise((done, reject) => {
     const r = http.request(new URL(target, d.url), { method, headers }, (answer) => {
@@ -57,7 +57,7 @@ test('a list of tags may span several header lines', async (t) => {
     assert.equal((await lines(d, 'GET', target, { 'if-match': ['"a"', '"b"'] })).status, 412);
     assert.equal((await lines(d, 'GET', target, { 'if-none-match': ['"a"', etag] })).status, 304);
   }
-  // Two codings are not the first of them.
+  // A list of two codings is not equal to its first entry.
   const twice = await lines(
     d,
     'POST',

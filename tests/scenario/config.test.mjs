@@ -1,4 +1,4 @@
-// The daemon refuses a configuration that cannot work before it uses it, and says what would work.
+// The daemon refuses a configuration that cannot work before it uses it, and says what to change.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';

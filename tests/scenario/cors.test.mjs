@@ -94,7 +94,7 @@ test('pages may send and read every header of the description', async (t) => {
     if (value.headers && !Array.isArray(value.headers)) Object.keys(value.headers).forEach((name) => replied.add(name));
     Object.values(value).forEach(walk);
   };
-  walk({ ...document, webhooks: undefined }); // those requests the daemon sends itself
+  walk({ ...document, webhooks: undefined }); // the daemon itself sends those requests
   const names = [...wanted].map((name) => name.toLowerCase());
   assert.ok(names.includes('prefer') && names.includes('range') && replied.has('ETag'));
   const { url } = (await d.upload(shapes.tetrahedron)).json;
@@ -112,7 +112,7 @@ test('pages may send and read every header of the description', async (t) => {
       assert.ok(listed(reply.headers['access-control-allow-headers']).includes(name), `${name} may be sent`);
     assert.ok(Number(reply.headers['access-control-max-age']) > 0);
   }
-  // Scripts may always read Cache-Control; the others are for browsers and proxies.
+  // Scripts may always read Cache-Control; the other headers are for browsers and proxies.
   const exposed = listed(
     (await send(d, 'GET', '/v1/meshes', { origin: ours })).headers['access-control-expose-headers'],
   );

@@ -1,5 +1,5 @@
-// Kills the daemon (kill -9) under load, repeatedly, at random instants and at every named point of the code. Afterwards
-// no accepted job is lost or ends twice, no object is torn, and --check-data passes.
+// Kills the daemon (kill -9) under load, repeatedly, at random instants and at every named point of the code.
+// Afterwards no accepted job is lost or ends twice, no object is incomplete, and --check-data passes.
 //
 // ORB_KILLS (20) is the number of kills. Named points need a build with ORB_FAULTS (the presets faults and asan); with
 // others, all kills are at random instants. ORB_SEED chooses the instants.
@@ -37,7 +37,7 @@ function pointsOf(folder) {
       : [];
   });
 }
-// This load reaches none of these: webhooks, S3, copies between stores, a check in a process of its own.
+// This load reaches none of these: webhooks, S3, copies between stores, a check in a separate process.
 const elsewhere = ['check-begun', 'publish-uploaded', 'transfer', 'webhook-answered'];
 const points = [...new Set(pointsOf(path.join(root, 'server')))].filter((name) => !elsewhere.includes(name)).sort();
 
@@ -266,7 +266,7 @@ test('20 kills of the daemon under 200 jobs: each of them succeeds', async (t) =
 test('a job that crashes the daemon three times fails, and other jobs go on', {
   skip: !faults && 'needs a build with ORB_FAULTS',
 }, async (t) => {
-  // in a process of its own the job would take only that with it: scenario.isolate
+  // in a separate process the job would end only that process: scenario.isolate
   const d = await daemon(t, { args: ['--workers', '2', '--isolate', 'off'] });
   const ledger = new Ledger();
   const mesh = await ledger.upload(d);
@@ -289,7 +289,7 @@ test('a job that crashes the daemon three times fails, and other jobs go on', {
     if (!end) await Promise.race([d.exited, sleep(500)]);
     while (gone(d)) {
       deaths++;
-      await d.start().catch((error) => assert.match(error.message, /exit SIGKILL/)); // it died again before it could say so
+      await d.start().catch((error) => assert.match(error.message, /exit SIGKILL/)); // it died again before it could report that
     }
   }
   assert.equal(end?.problem.type, '/problems/crashed');
@@ -299,5 +299,5 @@ test('a job that crashes the daemon three times fails, and other jobs go on', {
   await d.stop();
   d.env = {};
   await d.start();
-  await d.made('/v1/embeddings', { mesh: mesh.id }); // a caller may ask again, where the cause is gone
+  await d.made('/v1/embeddings', { mesh: mesh.id }); // a caller may ask again if the cause is gone
 });

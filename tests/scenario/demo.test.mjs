@@ -92,7 +92,7 @@ test('the demo says what the build does, and prefers port 8080', { skip }, async
   assert.match(out, /^building in .*\n {2}building: 3 of 7 \(\d+ s\)$/m);
   const port = Number(/^morphing .* at http:\/\/127\.0\.0\.1:(\d+)$/m.exec(out)[1]);
   if (!taken && port !== 8080) assert.ok(await isTaken(), `port ${port}, and 8080 was free`);
-  // where it is taken, any other
+  // if it is taken, any other port
   const holder = createServer();
   await new Promise((resolve) => holder.on('error', resolve).listen(8080, '127.0.0.1', resolve));
   t.after(() => holder.close());

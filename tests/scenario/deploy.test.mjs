@@ -23,7 +23,7 @@ test('the unit is sandboxed', { skip: lacks('systemd-analyze') }, () => {
   const { text } = run('systemd-analyze', ['security', '--offline=true', '--no-pager', unit]);
   const score = Number(/Overall exposure level for orbmorphd\.service: (\d+\.\d+)/.exec(text)?.[1]);
   assert.ok(score <= 1.0, text);
-  // The drop-in opens public addresses, and nothing else.
+  // The drop-in opens only public addresses.
   const open = path.join(mkdtempSync(path.join(tmpdir(), 'orbmorph-unit-')), 'orbmorphd.service');
   const own = readFileSync(path.join(root, 'deploy/outgoing.conf'), 'utf8').split('[Service]\n')[1];
   writeFileSync(open, readFileSync(unit, 'utf8').replace(/^\[Install\]$/m, `${own}\n$&`));
@@ -36,7 +36,7 @@ test('the unit is sandboxed', { skip: lacks('systemd-analyze') }, () => {
   writeFileSync(node, both.replace(/^\[Install\]$/m, `${after}\n$&`));
   assert.doesNotMatch(run('systemd-analyze', ['verify', node]).text, /Unknown|Failed to parse|Invalid|ignoring/i);
   rmSync(path.dirname(node), { recursive: true });
-  // 20: worse than that would be refused.
+  // 20: systemd-analyze refuses a worse score.
   assert.equal(run('systemd-analyze', ['security', '--offline=true', '--no-pager', '--threshold=20', unit]).status, 0);
   const verified = run('systemd-analyze', ['verify', unit, path.join(root, 'deploy/orbmorphd.socket')]).text;
   assert.doesNotMatch(verified, /Unknown|Failed to parse|Invalid|ignoring/i);
@@ -57,7 +57,7 @@ test('the programs are hardened', {
     assert.match(symbols, /__stack_chk_fail@/, 'stack protector');
     assert.match(symbols, /__(snprintf|vsnprintf|memcpy)_chk@/, 'fortified calls');
   }
-  // The library, where it reads meshes.
+  // The library, for the function that reads meshes.
   const library = path.join(path.dirname(path.dirname(binaries.daemon)), 'core/liborbmorph.so');
   assert.match(run('readelf', ['--dynamic', '--wide', library]).text, /FLAGS_1.*NOW/);
   assert.match(run('readelf', ['--segments', '--wide', library]).text, /GNU_RELRO/);
@@ -92,7 +92,7 @@ test('the bill of materials names all that the programs link and the studio bund
     for (const id of [spdxElementId, relatedSpdxElement]) assert.ok([...ids, bill.SPDXID].includes(id), id);
   assert.equal(bill.relationships.length, ids.length, 'each package has its relation');
 
-  // Every library in the daemon's memory belongs to a package of the bill, in the version that is installed.
+  // Every library in the daemon's memory belongs to a package of the bill, in the installed version.
   const versions = new Map(bill.packages.map(({ name, versionInfo }) => [name, versionInfo]));
   const names = run('readelf', ['--dynamic', '--wide', binaries.daemon]).text.match(/(?<=NEEDED.*\[)[^\]]+/g);
   assert.ok(names.length > 10, names.join());

@@ -1,5 +1,5 @@
-// A full disk: writes get 507, reads go on, and everything works again once there is space. The test mounts a small file
-// system in memory; it is skipped where mounting is not allowed.
+// A full disk: writes get 507, reads still work, and everything works again once there is space. The test mounts a
+// small file system in memory; it is skipped if mounting is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { closeSync, mkdtempSync, openSync, rmSync, unlinkSync, writeSync } from 'node:fs';
@@ -9,7 +9,7 @@ import test from 'node:test';
 import { Daemon, assertProblem } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-/** Fills the file system to the last block; what is left is less than one. */
+/** Fills the file system to the last block; less than one block is left. */
 function fill(file) {
   const fd = openSync(file, 'w');
   for (let size = 1 << 20; size >= 1; size = size >> 1)
@@ -51,7 +51,8 @@ for (const [reserve, what] of [
     assert.equal((await d.get(`${made.url}/sphere.ply`)).status, 200);
     assert.equal((await d.get('/v1/jobs')).status, 200);
     assert.equal((await d.get('/readyz')).status, 200);
-    // A job may still be taken while the catalogue has room in its log; then it ends, well or with the reason.
+    // The daemon may still accept a job while the catalogue has room in its log; then the job ends, well or with the
+    // reason.
     const job = await d.post('/v1/embeddings', { mesh: kept.json.id, method: 'kernel-sampling' });
     assert.ok([202, 507].includes(job.status), `${job.status} ${job.bytes}`);
     await new Promise((resolve) => setTimeout(resolve, 500));
@@ -102,7 +103,7 @@ test('a body of unknown length leaves the reserve free, too', async (t) => {
       json: JSON.parse(bytes),
     };
   };
-  assertProblem(await send(96), 507, 'storage-full'); // 24 MB, which the disk would have room for
+  assertProblem(await send(96), 507, 'storage-full'); // 24 MB, for which the disk has room
   assertProblem(await send(16), 400, 'malformed-mesh'); // 4 MB are read to the end
   assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
 });

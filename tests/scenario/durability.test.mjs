@@ -49,7 +49,7 @@ test('after every kill the daemon starts and continues', async (t) => {
     const { json: mesh } = await d.upload(shapes.obj(wobble(i, 3)), { name: `r${i}` });
     const reply = await d.post('/v1/supermeshes', { shapes: [{ mesh: first.id }, { mesh: mesh.id }] });
     assert.equal(reply.status, 202, reply.bytes.toString());
-    await new Promise((resolve) => setTimeout(resolve, (37 * i) % 500)); // at ever another stage of the job
+    await new Promise((resolve) => setTimeout(resolve, (37 * i) % 500)); // at a later stage of the job each time
     await kill(d);
     const end = await d.ended((await d.get(reply.json.url)).json);
     assert.equal(end.state, 'succeeded', JSON.stringify(end));
@@ -114,7 +114,7 @@ test('a second SIGTERM stops a draining daemon at once, and the job is kept', as
   do reply = await d.get('/readyz');
   while (reply.status === 200);
   assertProblem(reply, 503, 'unavailable');
-  // It drains: what is there can be read, what is new is refused, and a reload is no reason to stop.
+  // The daemon drains: stored data can be read, new work is refused, and a reload does not stop it.
   d.child.kill('SIGHUP');
   assert.equal((await d.get('/livez')).status, 200);
   const { json: other } = await d.upload(shapes.tetrahedron);
@@ -126,7 +126,7 @@ test('a second SIGTERM stops a draining daemon at once, and the job is kept', as
   await sleep(1500);
   assert.deepEqual([d.child.exitCode, d.child.signalCode], [null, null], 'it gives the job its time');
   assert.equal((await d.get(job.url)).json.state, 'running');
-  const { code } = await d.stop('SIGTERM'); // of the hour some seconds are over
+  const { code } = await d.stop('SIGTERM'); // some seconds of the hour have passed
   assert.equal(code, 0, d.log);
   await d.start();
   const now = (await d.get(job.url)).json;
@@ -136,7 +136,7 @@ test('a second SIGTERM stops a draining daemon at once, and the job is kept', as
 });
 
 test('a job that crashes the service three times fails, and the queue goes on', async (t) => {
-  // in a process of its own the death of the service is not the job's: scenario.isolate
+  // in a separate process the job does not die with the service: scenario.isolate
   const d = await daemon(t, { args: ['--workers', '1', '--isolate', 'off'] });
   const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, 5)), { name: 'poison' });
   const { json: small } = await d.upload(shapes.obj(wobble(2, 2)), { name: 'small' });

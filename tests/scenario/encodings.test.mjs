@@ -1,4 +1,4 @@
-// Compressed bodies: gzip and zstd, whole, broken, and decompression bombs.
+// Compressed bodies: gzip and zstd, complete, broken, and decompression bombs.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFile, readdir } from 'node:fs/promises';
@@ -30,7 +30,7 @@ function zstdZeros(blocks) {
   return Buffer.concat([head, body]);
 }
 
-/** A frame of zstd 0.7, from before the RFC: libzstd still reads it. */
+/** A frame of zstd 0.7, older than the RFC: libzstd still reads it. */
 function frameOf07(bytes) {
   return Buffer.concat([
     Buffer.from([0x27, 0xb5, 0x2f, 0xfd, 0x20, bytes.length, 0x40, 0, bytes.length]),
@@ -164,7 +164,7 @@ test('decoders share a budget of memory', async (t) => {
   const { hostname, port } = new URL(d.url);
   const large = zstd(Buffer.from(shapes.obj(shapes.egg(6)).repeat(4)), '-19', '--no-content-size'); // a window of 8 MB
   assertProblem(await send(d, 'zstd', large, {}), 503, 'unavailable');
-  // Uploads that have begun hold theirs until they end.
+  // Uploads that have begun hold their memory until they end.
   const open = [];
   t.after(() => open.forEach((socket) => socket.destroy()));
   const begin = await gzip(shapes.obj(shapes.egg(4)));

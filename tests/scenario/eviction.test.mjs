@@ -44,7 +44,7 @@ test('the least recently used embeddings are evicted, uploads never', async (t) 
     assert.equal((await d.get(`${embeddings[i]}/sphere.ply`)).status, 404);
   }
   assert.deepEqual(new Set(await statuses(d, meshes)), new Set([200]));
-  // What left can be made again.
+  // Evicted results can be made again.
   const mesh = meshes[2].split('/').at(-1);
   assert.equal((await d.made('/v1/embeddings', { mesh })).url, embeddings[2]);
 });
@@ -54,7 +54,7 @@ test('a derived object that is evicted while a job needs it is computed again', 
   const meshes = [];
   for (let i = 0; i < 6; i++)
     meshes.push((await d.upload(shapes.obj(shapes.ball(3, ([x, y, z]) => [x, y * (1 + i / 7), z])))).json.id);
-  // At a pace that leaves time to make what was removed, however slow the machine is.
+  // Slowly enough to make the removed results again, on any machine.
   const began = Date.now();
   await d.made('/v1/embeddings', { mesh: meshes[0] });
   const pause = Math.max(20, 2 * (Date.now() - began));
@@ -82,7 +82,8 @@ test('a derived object that is evicted while a job needs it is computed again', 
   }
   going = false;
   await remover;
-  // What the lists name is there, whole; what the budget takes meanwhile is in the list no more.
+  // Every entry of the lists exists and is complete; entries that the budget evicts meanwhile are no longer in the
+  // list.
   for (const [kind, file] of [
     ['embeddings', 'sphere.ply'],
     ['supermeshes', 'asset.glb'],
@@ -98,11 +99,11 @@ test('a derived object that is evicted while a job needs it is computed again', 
   await d.start();
 });
 
-// Beside nodes --gc may run, and objects are in the bucket: scenario.s3.
+// With several nodes, --gc may run beside them, and the objects are in the bucket: scenario.s3.
 const one = { skip: process.env.ORB_NODES && 'the test looks at the files of one data folder' };
 
 test('--gc removes derived objects beyond the budget and what no row names, and nothing else', one, async (t) => {
-  // Each use is noted where there is a budget, far off as it may be.
+  // If there is a budget, each use is recorded, however far the budget is from its limit.
   const d = await daemon(t, { args: ['--derived-bytes', '1G'] });
   const gc = (...args) => promisify(execFile)(binaries.daemon, ['--gc', '--data', d.data, ...args]);
   const check = async () => (await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data])).stdout;
@@ -125,7 +126,7 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   ).url;
   await d.stop();
 
-  // Without a budget all that has a row stays.
+  // Without a budget, everything with a row stays.
   await gc();
   assert.match(await check(), / 0 wrong, 0 objects without a row/);
   await d.start();
@@ -134,7 +135,7 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   for (const url of [`${made[0]}/sphere.ply`, made[1], merged]) assert.equal((await d.get(url)).status, 200);
   await d.stop();
 
-  // An object that a crash left between publishing and commit: of a kind of its own, beside one that is there.
+  // An object that a crash left between publishing and commit, beside an object with a row.
   const files = (await readdir(path.join(d.data, 'objects'), { recursive: true, withFileTypes: true })).filter((f) =>
     f.isFile(),
   );

@@ -55,7 +55,7 @@ test('the examples run', async (t) => {
     // it runs until it is told to stop, here once it has printed its address
     if (studio) command = `mkfifo said; ${command} >said & read -r line <said; echo "$line"; kill $!; wait $!`;
     const { code, out, err } = await runProgram('sh', ['-c', command], { env, cwd: at });
-    // the scan has a hole: the doctor says so, and which repair helps
+    // the scan has a hole: the doctor reports it, and which repair helps
     if (command.includes('doctor'))
       assert.ok(code === 1 && /--repair fill_holes scan\.stl/.test(out), `${line}: ${out}`);
     else assert.equal(code, 0, `${line}: ${err}`);

@@ -26,7 +26,7 @@ const bearer = async (d, name, ...more) => {
   const who = { headers: { authorization: `Bearer ${stdout.trim()}` } };
   return process.env.ORB_NODES ? d.known(who) : who;
 };
-/** Uploads the mesh and asks for its embedding; the job. */
+/** Uploads the mesh and requests its embedding; returns the job. */
 async function submit(d, seed, levels, options = {}, more = {}) {
   const mesh = await d.post('/v1/meshes', shapes.binaryPly(wobble(seed, levels)), options);
   assert.equal(mesh.status, 201, mesh.bytes.toString());
@@ -38,7 +38,7 @@ async function submit(d, seed, levels, options = {}, more = {}) {
   assert.equal(reply.status, 202, reply.bytes.toString());
   return reply.json;
 }
-/** When the job started and finished, in ms, once it has succeeded. */
+/** Waits until the job has succeeded; returns when it started and finished, in ms. */
 async function times(d, job, options) {
   let now;
   do now = (await d.get(job.url, { ...options, query: { wait: 20 } })).json;
@@ -51,7 +51,7 @@ const started = async (d, job, options) => (await times(d, job, options)).starte
 const spent = async (d, tenant, admin) =>
   1000 * (await d.get('/v1/usage', admin)).json.tenants.find((row) => row.tenant === tenant).worker_seconds;
 
-/** Keeps a worker until free() is called, so that everything that a test sends meanwhile has to queue. */
+/** Occupies a worker until free() is called, so that everything that a test sends meanwhile has to queue. */
 async function occupy(d, options = {}, seed = 99) {
   const job = await submit(d, seed, slow ? 5 : 6, options, { body: endless });
   while ((await d.get(job.url, options)).json.state === 'queued') await new Promise((done) => setTimeout(done, 5));
@@ -82,8 +82,8 @@ test('clients take turns', async (t) => {
   const of = [await times(d, guests[0], few), await times(d, guests[1], few)];
   const ahead = ran.filter(({ started }) => started < of[0].started).length;
   assert.ok(ahead <= 1, `the other caller waited for ${ahead} of 8`);
-  // Turns go by the time that jobs took. So between both jobs of the other caller those of the crowd took, but for the
-  // last one, at most the time of the first. Both count here, as more is known of the two alone.
+  // Turns depend on the time that jobs took. Between both jobs of the other caller, the crowd's jobs, except for the
+  // last one, took at most the time of the first. The limit is the time of both, since only their sum is known.
   const between = ran
     .filter(({ started }) => started > of[0].started && started < of[1].started)
     .map(({ started, finished }) => finished - started);
@@ -158,7 +158,7 @@ test('time, memory and cancelling', async (t) => {
   const times = [];
   const busy = [];
   for (let i = 0; i < 6; i++) {
-    const ends = i % 2 === 1; // by itself, perhaps before it is cancelled
+    const ends = i % 2 === 1; // without the cancellation, perhaps before it
     const job = await submit(other, i, ends ? (slow ? 6 : 7) : 5, {}, { body: ends ? {} : endless });
     while ((await other.get(job.url)).json.state === 'queued') await new Promise((done) => setTimeout(done, 5));
     await new Promise((done) => setTimeout(done, 40 * i));
@@ -177,7 +177,7 @@ test('time, memory and cancelling', async (t) => {
   t.diagnostic(
     `cancelled within ${times.map((ms) => ms.toFixed(0)).join(', ')} ms and ${busy.join(', ')} ms of processor time`,
   );
-  // The answer comes when the job has ended. On a machine that is busy with other things it comes later, but the
-  // daemon works no longer: two threads for a tenth of a second, read from a clock of hundredths.
+  // The answer arrives when the job has ended. On a busy machine it arrives later, but the daemon no longer works: two
+  // threads for a tenth of a second, read from a clock of hundredths.
   assert.ok(Math.max(...busy) <= (slow ? 1500 : 220), busy.join());
 });

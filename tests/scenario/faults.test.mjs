@@ -109,7 +109,7 @@ class Place {
   }
 }
 
-/** Each calls `arm` at the right moment and leaves a place that works; returns whether the fault happened. */
+/** Each calls `arm` at the right moment and leaves a place that works; returns whether a call failed. */
 const phases = {
   /** Starts the daemon, on an empty folder or on existing data. */
   async start(place, arm) {

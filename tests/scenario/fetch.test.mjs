@@ -6,7 +6,7 @@ import { assertProblem, binaries, daemon, until } from './support/daemon.mjs';
 import { origin } from './support/origin.mjs';
 import * as shapes from './support/shapes.mjs';
 
-// 127.0.0.2 is listed in the tests; what listens on 127.0.0.1 must not be reached.
+// 127.0.0.2 is listed in the tests; a server on 127.0.0.1 must not be reached.
 const listed = '127.0.0.2';
 const allow = ['--fetch-allow', listed];
 const egg = shapes.obj(shapes.egg(2));
@@ -60,7 +60,7 @@ test('a mesh from a URL is the mesh that an upload of the same bytes makes', asy
   const again = await post(d, { url: `${url}/moved` }, { headers: { prefer: 'wait=60' } });
   assert.equal(again.status, 200, again.bytes.toString());
   assert.deepEqual(again.json, mesh);
-  // It is a mesh as any other.
+  // It is a mesh like any other.
   await d.made('/v1/embeddings', { mesh: mesh.id });
   const { jobs } = (await d.get('/v1/jobs')).json;
   assert.deepEqual(
@@ -237,6 +237,6 @@ test('the command line takes URLs where it takes files', async (t) => {
   const refused = await run(['upload', 'http://127.0.0.1:9/egg.obj'], { env, cwd });
   assert.equal(refused.code, 1);
   assert.match(refused.err, /forbidden-address|address/);
-  // doctor deletes what it uploads, and takes files only.
+  // doctor deletes its uploads, and accepts only files.
   assert.equal((await run(['doctor', `${url}/egg.obj`], { env, cwd })).code, 2);
 });

@@ -1,5 +1,5 @@
-// Open meshes: repair=fill_holes fills them for the embedding, and the asset has the holes again. ORB_HOLES_ALL=1, as in
-// tests/long.sh: every open mesh with every method.
+// Open meshes: repair=fill_holes fills the holes for the embedding, and the asset has the holes again. ORB_HOLES_ALL=1,
+// as in tests/long.sh: every open mesh with every method.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import test from 'node:test';
@@ -13,7 +13,7 @@ const every = process.env.ORB_HOLES_ALL === '1';
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const unit = (a) => a.map((x) => x / Math.hypot(...a));
 
-/** The triangles of a mesh that `keep` wants, by the mean of their points on the sphere. */
+/** The triangles of a mesh for which `keep` is true, given the mean of their points on the sphere. */
 function cut(mesh, keep) {
   const triangles = mesh.triangles.filter((t) =>
     keep(unit([0, 1, 2].map((k) => t.reduce((sum, v) => sum + mesh.points[v][k], 0)))),
@@ -60,7 +60,7 @@ for (const [name, height] of [
 const wide = ['bust with a wide hole', cut(shapes.egg(4), away([0.2, -1, 0.1], 70)), 1];
 open.push(wide);
 
-/** The edges of one triangle only, as pairs of points; what lies at one place is one vertex. */
+/** The edges of exactly one triangle, as pairs of points; vertices at one place are one vertex. */
 function rimOf(positions, triangles) {
   const key = (v) => positions[v].map((x) => x + 0).join();
   const edges = new Map();
@@ -93,7 +93,7 @@ const middle = ([a, b]) => a.map((x, k) => (x + b[k]) / 2);
 const farFrom = (points, edges) =>
   Math.max(...points.map((p) => Math.min(...edges.map(([a, b]) => toTriangle(p, a, b, b)))));
 
-/** That the asset is open along the rims of `mesh` and nowhere else. */
+/** Asserts that the asset is open along the rims of `mesh` and nowhere else. */
 function assertRims(asset, mesh, count, what) {
   const morph = morphOf(asset);
   const made = rimOf(triple(morph.shapes[0]), triple(morph.triangles));
@@ -153,7 +153,7 @@ for (const remesh of REMESH)
 
 const scans = ['bunny_five_holes.obj', 'cowhead_open.obj'];
 
-/** The pieces of a mesh, the largest first: triangles hang together by edges between the same places. */
+/** The pieces of a mesh, the largest first: edges between the same places connect triangles. */
 function piecesOf({ positions, triangles }) {
   const root = triangles.map((_, i) => i);
   const find = (i) => {
@@ -178,7 +178,9 @@ function piecesOf({ positions, triangles }) {
   return [...pieces.values()].sort((a, b) => b.length - a.length).map((list) => ({ positions, triangles: list }));
 }
 
-/** The problem of an open mesh that is not a surface with its holes filled, by index.csv, and who is at fault. */
+/**
+ * The problem of an open mesh that is not a surface even with its holes filled, by index.csv, and the shape at fault.
+ */
 function refusalOf(row) {
   if (/^NaN/.test(row.reason)) return ['not-finite', 'vertices'];
   if (row.orientable === 'False') return ['not-orientable', 'edges'];

@@ -1,4 +1,4 @@
-// Files as people have them: compressed and quantized glTF, 3MF, and files of other kinds, which the refusal names.
+// Files that people have: compressed and quantized glTF, 3MF, and files of other kinds, which the refusal names.
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { readFile, writeFile } from 'node:fs/promises';
@@ -31,7 +31,7 @@ test('quantized and meshopt-compressed glTF are read: the mesh is that of the pl
     near(mesh.volume, plain.volume, 1e-3, 'volume');
     near(mesh.area, plain.area, 1e-3, 'area');
   }
-  // every byte of the compressed data that is damaged gives a mesh or a problem
+  // damage to any byte of the compressed data gives a mesh or a problem
   for (let at = 100; at < packed.bytes.length; at += Math.ceil(packed.bytes.length / 40)) {
     const damaged = Buffer.from(packed.bytes);
     damaged[at] ^= 0x5a;
@@ -57,7 +57,7 @@ test('Draco-compressed glTF is read, and damaged data is refused', { skip: !exis
   assertProblem(await d.upload(glb.subarray(0, at + length / 2)), 400, 'malformed-mesh');
 });
 
-// A box of 1 × 2 × 3 cm in two materials, in a component that doubles it and moves it by 5 cm: written by lib3mf 1.8.1.
+// A box of 1 × 2 × 3 cm in two materials, in a component that doubles it and moves it by 5 cm, written by lib3mf 1.8.1.
 const boxOfLib3mf = Buffer.from(
   [
     'UEsDBC0AAAAIAAAAAACWewfy//////////8QABQAM0QvM2Rtb2RlbC5tb2RlbAEAEACQCAAAAAAAAPMCAAAAAAAAlVbLbtswEDwnX0GwZ0YvUh',

@@ -1,4 +1,4 @@
-// Stored bytes that have changed: no result is computed from them, and uploading the file again restores them.
+// Stored bytes that have changed: the daemon computes no result from them, and uploading the file again restores them.
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
@@ -44,7 +44,7 @@ const quarantined = async (d) =>
   Number(/^orbmorph_objects_quarantined_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
 
 test('a flipped bit is found when an object is first served after a start', async (t) => {
-  const d = await daemon(t); // whose scrub looks at the same objects at the same time
+  const d = await daemon(t); // its scrub reads the same objects at the same time
   const texts = [shapes.obj(shapes.egg(2)), shapes.obj(shapes.bean(2))];
   const meshes = [(await d.upload(texts[0])).json, (await d.upload(texts[1])).json];
   const request = { shapes: meshes.map(({ id }) => ({ mesh: id })), align: { method: 'rotate' } };
@@ -61,7 +61,7 @@ test('a flipped bit is found when an object is first served after a start', asyn
   for (const [, url] of made) right.set(url, (await d.get(url)).bytes);
   assert.equal(await quarantined(d), 0);
 
-  // A mesh is healed by sending it again.
+  // Sending a mesh again restores it.
   await d.stop();
   const bad = flip(d, 'mesh', meshes[0].id);
   await d.start();
@@ -75,7 +75,8 @@ test('a flipped bit is found when an object is first served after a start', asyn
   assert.equal((await d.upload(texts[0])).status, 200);
   assert.equal((await d.get(`${meshes[0].url}/file`)).bytes.toString(), texts[0]);
 
-  // Each kind of derived object: never served wrong; a profile is made again, all else by the next request for it.
+  // Each kind of derived object: a damaged one is never served; the daemon makes a profile again by itself, all others
+  // at the next request.
   for (const [kind, url, resource] of made) {
     await d.stop();
     flip(d, kind, resource.split('/').pop());

@@ -19,7 +19,7 @@ const wobble = (n, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 *
 const status = (pid, name) =>
   new RegExp(`^${name}:\\s+(\\d+)`, 'm').exec(readFileSync(`/proc/${pid}/status`, 'latin1'))?.[1];
 
-/** The processes of jobs alone: one that has read files stays for a while, for more files of its tenant. */
+/** Only the processes of jobs: a process that has read files stays for a while, for more files of its tenant. */
 const only = (d, count) => until(() => workers(d).length === count && workers(d), `${count} processes that work`, 60);
 const one = async (d) => (await only(d, 1))[0];
 const running = (d, job) => until(async () => (await d.get(job.url)).json.stage === 'embed', 'the job runs', 120);
@@ -37,7 +37,7 @@ test('a job runs confined', async (t) => {
   await running(d, job);
   const pid = await one(d);
   const files = readdirSync(`/proc/${pid}/fd`)
-    .filter((fd) => fd !== '2') // where the daemon logs
+    .filter((fd) => fd !== '2') // the daemon's log
     .map((fd) => readlinkSync(`/proc/${pid}/fd/${fd}`));
   assert.equal(files.filter((to) => to.startsWith('socket:')).length, 1, `only its channel: ${files}`);
   for (const to of files) assert.doesNotMatch(to, /catalogue|lock|\/tmp\/put-/, `${files}`);
@@ -101,7 +101,10 @@ test('a process that dies while it checks a file leaves a record, and after thre
   });
   const [evil, other] = [await bearer('evil'), await bearer('other')];
   const file = Buffer.from(shapes.binaryPly(wobble(7, 6)));
-  /** Uploads the file and kills the process that checks it. A check that ends before the signal comes is undone. */
+  /**
+   * Uploads the file and kills the process that checks it. If the check ends before the signal arrives, deletes the
+   * mesh and tries again.
+   */
   async function killed(signal) {
     for (;;) {
       const asked = d.post('/v1/meshes', file, evil);
@@ -161,7 +164,7 @@ test('a job that hangs ends at its time limit', async (t) => {
 test('a check that hangs delays nobody, and ends with its client, at check-seconds, and with the service', async (t) => {
   const d = await daemon(t, { args: ['--workers', '2', '--check-seconds', String(6 * patience)] });
   const file = Buffer.from(shapes.binaryPly(wobble(3, 6)));
-  /** Stops a worker. False: it has ended meanwhile. */
+  /** Stops a worker. Returns false if it has ended meanwhile. */
   function stopped(pid) {
     try {
       return process.kill(pid, 'SIGSTOP');
@@ -206,7 +209,7 @@ test('a check that hangs delays nobody, and ends with its client, at check-secon
   assert.ok(Date.now() - asked < 5000 * patience, `it took ${Date.now() - asked} ms to stop`);
 });
 
-/** Whether the process was told; false: it has ended. */
+/** Returns whether the process got the signal; false if it has ended. */
 function told(pid, signal) {
   try {
     return process.kill(pid, signal);
@@ -230,7 +233,7 @@ test('one process reads small files of one tenant, and none of another', async (
     assert.equal(reply.status, 201, reply.bytes.toString());
     return reply;
   };
-  /** Uploads until the process that reads files of this tenant alone is still there. */
+  /** Uploads until exactly one process remains: the one that reads the files of this tenant. */
   const reader = async (as) => {
     for (;;) {
       await upload(as);
@@ -259,7 +262,8 @@ test('one process reads small files of one tenant, and none of another', async (
   );
   await until(() => workers(d).length === 0, 'idle processes end', 20);
 
-  // It dies with the second file, perhaps because of the first: the second is read again, and nobody is blamed.
+  // The process dies during the second file, perhaps because of the first: the second is read again, and no file is
+  // blamed.
   await until(
     async () => {
       const pid = await reader(tenants[0]);

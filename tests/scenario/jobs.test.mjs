@@ -76,7 +76,7 @@ test('events report progress and the end, and resume', async (t) => {
   assert.match(resumed.bytes.toString(), /^event: ?succeeded/m);
 });
 
-// Where several nodes answer by turns, the one that runs the job is ahead of the others by up to a second.
+// If several nodes answer in turn, the one that runs the job is ahead of the others by up to a second.
 const together = { skip: process.env.ORB_NODES && 'nodes know the progress of the job at different times' };
 test('progress moves at least once a second while a job runs, and never back', together, async (t) => {
   const d = await daemon(t);
@@ -124,7 +124,7 @@ test('a job can be cancelled while it waits and while it runs', async (t) => {
 test('cancelling a job also cancels the jobs that only it needs, at any moment', async (t) => {
   const d = await daemon(t, { args: ['--workers', '2'] });
   const [first, second] = [await heavy(d, 1, 5), await heavy(d, 2, 5)];
-  // Of all nodes, where there are several: /readyz?verbose has what one of them runs.
+  // Counts the jobs of all nodes, if there are several: /readyz?verbose shows only those that one of them runs.
   const usage = async () => (await d.get('/v1/usage')).json.tenants[0];
   const work = async () => (({ queued, running }) => queued + running)(await usage());
   const merge = { shapes: [first, second].map(({ id }) => ({ mesh: id })), embedding: endless };
@@ -204,7 +204,7 @@ test('a full queue refuses new jobs and nothing else', async (t) => {
   const waiting = await d.post('/v1/embeddings', long(meshes[2]), { headers: { prefer: 'wait=30' } });
   assertProblem(waiting, 429, 'queue-full');
   assert.equal((await d.get('/v1/jobs')).json.jobs.length, 2, 'no trace of what was refused');
-  // What is queued already is still answered, as are uploads and reads.
+  // Queued requests are still answered, as are uploads and reads.
   assert.equal((await d.post('/v1/embeddings', long(meshes[1]))).json.id, jobs[1].id);
   assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
   assert.equal((await d.get(meshes[2].url)).status, 200);
@@ -222,7 +222,7 @@ test('the list of a state has exactly the jobs in it, also those that wait for a
     await d.post('/v1/supermeshes', { shapes: meshes.slice(0, 2).map(({ id }) => ({ mesh: id })), embedding: endless })
   ).json;
   await until(async () => (await d.get(merge.url)).json.state === 'running', 'what the merge needs runs');
-  const behind = []; // asked for only now: which of several begins first is the queue's choice
+  const behind = []; // requested only now: the queue chooses which of several jobs begins first
   for (let i = 0; i < 3; i++)
     behind.push(
       (

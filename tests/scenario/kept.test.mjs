@@ -1,4 +1,5 @@
-// Alignments are kept: other members of "remesh" and "asset" cost no new alignment, and the bytes are the same.
+// Alignments are kept: requests with other members "remesh" and "asset" need no new alignment, and the bytes are the
+// same.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { readdir, readFile, truncate, writeFile } from 'node:fs/promises';

@@ -93,7 +93,7 @@ test('supermeshes are listed by mesh and by name', async (t) => {
     [ids[4]],
   );
 
-  // What is deleted, is deleted from these lists too.
+  // A deleted supermesh also leaves these lists.
   assert.equal((await d.delete(`/v1/supermeshes/${ids[4]}`)).status, 204);
   assert.deepEqual(await list({ name: 'two' }), []);
   assert.equal((await list({ mesh: meshes.egg })).length, 3);

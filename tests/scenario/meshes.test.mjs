@@ -317,7 +317,7 @@ test('lists are paged; a deleted mesh is gone', async (t) => {
 });
 
 test('small uploads are checked while large ones are in progress', async (t) => {
-  // With one worker, one thread checks uploads of more than 16 MB, another the rest.
+  // With one worker, one thread checks uploads of more than 16 MB and another checks the rest.
   const d = await daemon(t, { args: ['--workers', '1'] });
   const shape = shapes.ball(8, ([x, y, z]) => [x, 1.5 * y, z * (1 + 0.2 * x)]);
   const text = shapes.obj(shape);

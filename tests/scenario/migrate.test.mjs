@@ -1,5 +1,5 @@
-// orbmorphd migrate: a deployment goes from SQLite and files to PostgreSQL and S3 and back, is killed on the way, and
-// meets damage. Runs under tests/tools/with_postgresql.sh and tests/tools/with_s3.sh.
+// orbmorphd migrate: a deployment moves from SQLite and files to PostgreSQL and S3 and back; the move is killed on the
+// way and meets damage. Runs under tests/tools/with_postgresql.sh and tests/tools/with_s3.sh.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { createHash } from 'node:crypto';
@@ -25,7 +25,7 @@ const schema = (url) => /search_path%3D(\w+)/.exec(url)[1];
 const sha256 = (bytes) => createHash('sha256').update(bytes).digest('hex');
 const mesh = (k) => shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(5 * y + k)), 1.5 * y, z]));
 
-/** A place for a deployment: a data folder, and the options that say where the rest is. */
+/** A place for a deployment: a data folder, and the options that name the other stores. */
 function place(top, name, { postgresql = false, inS3 = false } = {}) {
   const prefix = `${path.basename(top)}-${name}`;
   const where = {
@@ -57,7 +57,7 @@ async function refused(result, why, code = 78) {
   assert.match(out + err, why);
 }
 
-/** What the commands list: tokens, keys and webhooks. */
+/** The output of the commands that list tokens, keys and webhooks. */
 async function listed(at) {
   const all = {};
   for (const what of ['token', 'key', 'webhook']) {
@@ -73,7 +73,7 @@ async function listed(at) {
 
 const as = (token) => ({ headers: { authorization: `Bearer ${token}` } });
 
-/** What callers see: every list, description, file and event, by URL. Files by their hash. */
+/** Everything that callers see: every list, description, file and event, by URL. Files by their hash. */
 async function seen(d, tokens) {
   const all = {};
   for (const [name, token] of Object.entries(tokens)) {
@@ -150,7 +150,7 @@ test('there and back: the same ids and bytes, also after a kill', async (t) => {
   await refused(migrate(old, cluster), /in use by another process/, 1);
   await d.stop();
 
-  // Killed once the first objects are there.
+  // The move is killed once the first objects exist.
   const child = spawn(program, ['migrate', ...old.from, ...cluster.to], { stdio: ['ignore', 'pipe', 'inherit'] });
   const ended = new Promise((done) => child.once('exit', (_, signal) => done(signal)));
   let printed = '';
@@ -164,7 +164,7 @@ test('there and back: the same ids and bytes, also after a kill', async (t) => {
   const other = path.join(top, 'other'); // another node, with a folder of its own
   await refused(run('--listen', '127.0.0.1:0', ...cluster.to, '--data', other), /migrate has filled .* in part/);
 
-  // What the source deletes meanwhile is not on the target, and what changes there changes here.
+  // Rows that the source deletes meanwhile do not reach the target, and changed rows change there too.
   const again = await serve(t, old, '--auth', 'on', ...allow);
   assert.equal((await again.delete(`/v1/meshes/${ids[60]}`, as(tokens.ann))).status, 204);
   const late = await again.post('/v1/meshes', Buffer.from(mesh(1000)), as(tokens.bob));
@@ -262,7 +262,8 @@ test('a flipped bit in the source is named, not copied', async (t) => {
   const good = Buffer.from(mesh(1));
   const bad = Buffer.from(good);
   bad[bad.length >> 1] ^= 1;
-  // As a disk would alter it, with the right hash beside it; as someone with the keys would, with that of the wrong bytes.
+  // An object altered as a disk would alter it, beside the right hash; and as an attacker with the keys would, with the
+  // hash of the wrong bytes.
   for (const meta of [sha256(good), sha256(bad)]) {
     assert.ok((await s3(bucket, 'PUT', `objects/${key}`, bad, { sha256: meta })).ok);
     await refused(migrate(from, to), new RegExp(`^mesh ${a.id}: its object does not match its hash$`, 'm'), 1);
@@ -275,7 +276,7 @@ test('a flipped bit in the source is named, not copied', async (t) => {
   assert.ok((await s3(bucket, 'DELETE', `objects/${key}`)).ok);
   await refused(migrate(from, to), new RegExp(`^mesh ${a.id}: its object is missing$`, 'm'), 1);
   assert.ok((await s3(bucket, 'PUT', `objects/${key}`, good, { sha256: sha256(good) })).ok);
-  // A bit that flips in what an earlier run has copied.
+  // A bit flips in an object that an earlier run has copied.
   const file = path.join(to.data, 'objects/mesh', b.id.slice(0, 2), b.id);
   writeFileSync(file, bad);
   const healed = await migrate(from, to);

@@ -10,7 +10,7 @@ import * as shapes from './support/shapes.mjs';
 
 const landmarks = JSON.parse(await readFile(path.join(samples, 'dog-giraffe.json'), 'utf8'));
 
-// Small shapes, and a rotation in place of a search for correspondences, which takes long.
+// Small shapes, and a rotation instead of a search for correspondences, which takes long.
 async function pair(d) {
   const ids = [];
   for (const [name, mesh] of Object.entries({ egg: shapes.egg(2), bean: shapes.bean(2) }))
@@ -190,7 +190,7 @@ test('the problem of the job is the answer, and a recipe that fails is not compu
   const jobs = (await d.get('/v1/jobs')).json.jobs.length;
   assertProblem(await d.get(url), 422, 'bad-landmarks');
   assert.equal((await d.get('/v1/jobs')).json.jobs.length, jobs);
-  // A job that is cancelled says so, and the next request starts another.
+  // A cancelled job says so, and the next request starts another job.
   const slow = await d.get(`${small(ids)}&preset=quality&wait=0`);
   if (slow.status === 503) {
     await d.delete(slow.json.url);
@@ -236,7 +236,7 @@ test('a download is named after its shapes', async (t) => {
     [`${'a'.repeat(120)},${'b'.repeat(120)}`, `${'a'.repeat(120)}-${'b'.repeat(29)}.glb`],
   ])
     assert.equal(await named(`${url}&names=${encodeURIComponent(names)}`), file, names);
-  // What ASCII cannot say comes a second time, encoded by RFC 8187: only attr-char and %XX of UTF-8.
+  // A name that ASCII cannot express is sent a second time, encoded by RFC 8187: only attr-char and %XX of UTF-8.
   for (const [names, plain, whole] of [
     ['Hund,Kätzchen', 'Hund-K_tzchen.glb', 'Hund-Kätzchen.glb'],
     ["my dog,it's 100 %", 'my_dog-it_s_100__.glb', "my dog-it's 100 %.glb"],

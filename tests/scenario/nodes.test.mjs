@@ -58,7 +58,7 @@ async function eventsOf(node, job, after, enough) {
   return events;
 }
 
-/** The last stage of a job is remembered only by nodes that watched it. */
+/** Only nodes that watched a job remember its last stage. */
 function sameEnd(one, other) {
   assert.deepEqual({ ...one, stage: null }, { ...other, stage: null });
 }
@@ -82,7 +82,7 @@ test('what one node accepts, others run and show', async (t) => {
   assert.equal(reply.status, 202);
   const twice = await b.post('/v1/embeddings', { mesh: id });
   assert.equal(twice.status, 202);
-  assert.equal(twice.json.id, reply.json.id); // one flight a key
+  assert.equal(twice.json.id, reply.json.id); // one flight per key
   const w = await c.node('--role', 'work', '--metrics-listen', '127.0.0.1:0', '--traces', traces.url);
   for (const health of ['/livez', '/readyz']) assert.equal((await w.get(health)).status, 200);
   for (const other of ['/v1/meshes', '/', '/openapi.json', '/v1/morph.glb'])
@@ -95,7 +95,8 @@ test('what one node accepts, others run and show', async (t) => {
   assert.equal(spheres[0].status, 200);
   assert.ok(spheres[0].bytes.equals(spheres[1].bytes));
 
-  // A supermesh waits for an embedding that it lacks; its events come from any node, and go on where they ended.
+  // A supermesh waits for an embedding that it lacks; any node sends its events, and each continues where the previous
+  // one ended.
   const other = await b.upload(newMesh());
   const trace = '4bf92f3577b34da6a3ce929d0e0e4736';
   const merged = await b.post(
@@ -114,7 +115,7 @@ test('what one node accepts, others run and show', async (t) => {
     204,
   );
 
-  // Two nodes had part in it, and one trace has both.
+  // Two nodes took part in the job, and one trace has both.
   const of = (span) => span.trace === trace;
   const names = ['POST /v1/supermeshes', 'embedding job', 'supermesh job'];
   await until(() => names.every((name) => traces.named(name, of).length > 0), 'the spans of request and jobs');
@@ -128,7 +129,7 @@ test('what one node accepts, others run and show', async (t) => {
   assert.ok(traces.named('remesh', of).every(({ parent }) => parent === ran.id));
   assert.equal(traces.named('embedding job', of)[0].parent, asked.id);
 
-  // The node that has done the work counts it, those that serve do not.
+  // The node that has done the work counts it; nodes that only serve the result do not.
   const done = async (node) =>
     /^orbmorph_jobs_ended_total\{state="succeeded"\} (\d+)$/m.exec((await node.get('/metrics')).bytes)[1];
   assert.ok(Number(await done(w)) >= 3);
@@ -136,7 +137,7 @@ test('what one node accepts, others run and show', async (t) => {
     /^orbmorph_job_seconds_count\{kind="supermesh"\} (\d+)$/m.exec((await node.get('/metrics')).bytes)[1];
   assert.deepEqual([await merges(a), await merges(b), await merges(w)], ['0', '0', '1']);
 
-  // Deleted on one node, it is gone on all.
+  // A resource deleted on one node is gone on all.
   const gone = rest.at(-1).job.result;
   assert.equal((await a.get(gone)).status, 200);
   assert.equal((await b.delete(gone)).status, 204);
@@ -305,7 +306,7 @@ test('while PostgreSQL is unreachable, requests get 503 and running jobs lose no
   const done = await a.ended(json);
   assert.equal(done.state, 'succeeded');
   assert.equal(done.attempt, 1);
-  assert.equal(a.log.match(/supermesh job done/g).length, 1); // what it made was not made again
+  assert.equal(a.log.match(/supermesh job done/g).length, 1); // its results were not computed again
   c.cut();
   assert.equal((await a.upload(newMesh())).status, 201);
   await c.check();
@@ -349,7 +350,8 @@ test('a download whose node loses its lock again and again runs again', async (t
   const body = newMesh();
   const { url } = await origin(t, (_, response) => response.end(body));
   let cuts = 0;
-  // Between publishing and the commit of the row: at the upload, and whenever the node looks whether it is still there.
+  // Between publishing and the commit of the row: at the upload, and whenever the node checks that the object still
+  // exists.
   proxy.decide = ({ method, path: at }) => {
     if (cuts < 5 && /mesh/.test(at) && (method === 'PUT' || method === 'HEAD')) {
       c.cutLock();
@@ -364,7 +366,7 @@ test('a download whose node loses its lock again and again runs again', async (t
   assert.match(await c.check(), /^1 rows and 1 objects checked: 0 wrong/);
 });
 
-/** What clients of the cluster were promised. */
+/** The promises made to clients of the cluster. */
 class Ledger {
   jobs = new Map(); // url → job
   meshes = [];
@@ -424,7 +426,7 @@ test('no chaos loses an accepted job, or changes what it made', async (t) => {
       await node.stop('SIGKILL');
       await node.start();
     },
-    /** Beyond its lease, while the next rounds go on. */
+    /** For longer than its lease, while the next rounds continue. */
     async pause(node) {
       const { child } = node;
       child.kill('SIGSTOP');

@@ -1,4 +1,4 @@
-// Holds the API document to what the daemon answers: it must contain every status, header and member.
+// Compares the API document with the daemon's answers: it must contain every status, header and member.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readFile } from 'node:fs/promises';
@@ -369,7 +369,7 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
   for (const [kind, name, body] of refusals)
     assert.equal((await create(kind, body)).json.type, `/problems/${name}`, JSON.stringify(body).slice(0, 200));
   assert.equal((await create('embeddings', kept, { query: { wait: 'long' } })).status, 400);
-  // Refused by its headers: the body is never sent, for the connection closes.
+  // Refused because of its headers: the body is never sent, since the connection closes.
   const large = await bare(d, 'POST', '/v1/embeddings', { 'content-length': 1_100_000 });
   assert.equal(hold(large, 'POST', '/v1/embeddings').json.type, '/problems/too-large');
   const clash = await create('supermeshes', {

@@ -1,4 +1,4 @@
-// The API document by itself: its references, schemas and examples, and the sources that write what it quotes.
+// The API document alone: its references, schemas and examples, and the sources of the texts that it quotes.
 import assert from 'node:assert/strict';
 import { readdir, readFile } from 'node:fs/promises';
 import path from 'node:path';

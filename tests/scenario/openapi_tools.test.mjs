@@ -1,5 +1,5 @@
-// Checks the API document with other tools: Redocly and Spectral find nothing to warn about, and a client with the
-// types of openapi-typescript compiles as it is and talks to the daemon.
+// Checks the API document with other tools: Redocly and Spectral report no warnings, and a client with the types of
+// openapi-typescript compiles and talks to the daemon.
 import assert from 'node:assert/strict';
 import { copyFile, readFile, symlink, writeFile } from 'node:fs/promises';
 import path from 'node:path';

@@ -1,4 +1,4 @@
-// What an operator sees and changes while the daemon runs: counters, the log, SIGHUP.
+// What an operator can see and change while the daemon runs: counters, the log, SIGHUP.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readFile, readdir, writeFile, mkdtemp, rm } from 'node:fs/promises';
@@ -38,7 +38,7 @@ test('the counters count the bytes sent', async (t) => {
   assert.equal((await d.request('HEAD', `${url}/file`)).status, 200);
   const grown = (await sent()) - before;
   const files = 3 * text.length + 100;
-  // Beside the files only the first answer of /metrics itself was sent.
+  // Besides the files, only the first answer of /metrics itself was sent.
   assert.ok(grown > files && grown < files + 10_000, `${grown} for ${files}`);
 });
 
@@ -138,7 +138,7 @@ test('SIGHUP reads limits and quotas that take effect', async (t) => {
   assert.equal(second.status, 202, second.bytes.toString());
   for (const { json } of [first, second]) await d.delete(json.url, web);
 
-  // The catalogue may be changed by other means than the command, as a restored copy would.
+  // The catalogue may change by other means than the command, for example by a restored copy.
   const set = (quota) =>
     run('sqlite3', [
       '-cmd',
@@ -173,8 +173,8 @@ test('worker-nice lowers the priority of workers and of the threads of their job
     [{ args: ['--worker-nice', '12'] }, 12],
     [{ env: { ORBMORPH_WORKER_NICE: '9' } }, 9],
   ]) {
-    if (level <= own) continue; // these tests themselves run at a level that cannot be left
-    const args = ['--workers', '2', '--scrub-rate', '0', ...(more.args ?? [])]; // the scrub has a level of its own
+    if (level <= own) continue; // these tests themselves run at a priority that a process cannot leave
+    const args = ['--workers', '2', '--scrub-rate', '0', ...(more.args ?? [])]; // the scrub has its own priority
     const d = await daemon(t, { ...more, args });
     const { json } = await d.upload(shapes.obj(shapes.ball(5, ([x, y, z]) => [x, 1.2 * y, z])));
     const job = (await d.post('/v1/embeddings', { mesh: json.id })).json;

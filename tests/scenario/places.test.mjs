@@ -1,4 +1,4 @@
-// The places of a supermesh's vertices in the uploaded files, against the files and the asset.
+// Compares the places of a supermesh's vertices in the uploaded files with the files and the asset.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { daemon, assertProblem } from './support/daemon.mjs';
@@ -62,7 +62,7 @@ test('places of a supermesh name triangles of the files', async (t) => {
     assert.equal(places.count, 2);
     assert.equal(places.vertices, supermesh.vertices);
 
-    // Every vertex of the asset is at the place of one supermesh vertex, on both shapes; and the other way.
+    // Every vertex of the asset is at the place of one supermesh vertex, on both shapes, and vice versa.
     const morph = morphOf((await d.get(supermesh.asset)).bytes);
     const near = (p, q) => Math.hypot(...p.map((x, i) => x - q[i])) < 3e-6;
     const glb = [];
@@ -90,7 +90,7 @@ test('places of a supermesh name triangles of the files', async (t) => {
     }
     assert.equal(met.size, glb.length);
 
-    // The landmarks' vertices are where the caller put them.
+    // The landmarks' vertices are where the caller placed them.
     supermesh.landmarks.forEach((l, i) => {
       for (const s of [0, 1]) {
         const asked = landmarks[i].at[s];

@@ -1,5 +1,5 @@
-// A catalogue in PostgreSQL: what the daemon refuses at its start, and what happens when the database goes away.
-// Runs under tests/tools/with_postgresql.sh. Other scenarios run there as they do with SQLite.
+// A catalogue in PostgreSQL: what the daemon refuses at its start, and what happens when the database goes away. Runs
+// under tests/tools/with_postgresql.sh. The other scenarios run there in the same way as with SQLite.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
@@ -11,7 +11,7 @@ import { assertProblem, Daemon, daemon, samples } from './support/daemon.mjs';
 import { tetrahedron } from './support/shapes.mjs';
 
 const server = process.env.ORB_POSTGRESQL;
-const program = process.env.ORB_DAEMON; // that starts without a catalogue of its own
+const program = process.env.ORB_DAEMON; // starts a daemon without its own catalogue
 assert.ok(server && program, 'to be run by tests/tools/with_postgresql.sh');
 
 const sql = (text, url = server) =>

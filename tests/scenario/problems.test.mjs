@@ -1,5 +1,5 @@
-// Holds docs/troubleshooting.md to the daemon: a section for every problem, its page at the problem's type, and in each
-// section the facts that the daemon's answers have.
+// Compares docs/troubleshooting.md with the daemon: a section for every problem, its page at the problem's type, and in
+// each section the facts that the daemon's answers have.
 import assert from 'node:assert/strict';
 import http from 'node:http';
 import { readFile } from 'node:fs/promises';
@@ -47,7 +47,7 @@ test('the type of every problem leads to its section', async (t) => {
   assert.equal((await d.get('/problems/none-such')).status, 404);
 });
 
-/** A request that fetch refuses to make. */
+/** A request that fetch refuses to send. */
 function bare(url, method, target, headers, body) {
   return new Promise((done, reject) => {
     const r = http.request(new URL(target, url), { method, headers }, (answer) => {
@@ -122,7 +122,7 @@ test('sections name the facts that answers have', async (t) => {
   meets('precondition-failed', await d.get(`${a.url}/file`, { headers: { 'if-match': '"other"' } }));
   meets('range-not-satisfiable', await d.get(`${a.url}/file`, { headers: { range: 'bytes=99999999-' } }));
 
-  // A long job, and what is refused while it runs.
+  // A long job, and the requests that are refused while it runs.
   const body = { mesh: a.id, ...endless };
   const job = await d.post('/v1/embeddings', body);
   assert.equal(job.status, 202);

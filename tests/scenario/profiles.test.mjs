@@ -77,7 +77,7 @@ test('both routes serve each profile, which is made once', async (t) => {
   assertProblem(refused, 400, 'bad-query');
   assert.equal(refused.json.parameter, 'profile');
 
-  // A profile survives the process, and nothing is made again.
+  // A profile survives the process, and the daemon makes nothing again.
   const bytes = (await d.get(`${url}&profile=meshopt`)).bytes;
   await d.stop();
   const check = () => spawnSync(binaries.daemon, ['--check-data', '--data', d.data], { encoding: 'utf8' });
@@ -87,7 +87,7 @@ test('both routes serve each profile, which is made once', async (t) => {
   assert.ok((await d.get(`${url}&profile=meshopt`)).bytes.equals(bytes));
   assert.equal(made(d, 'meshopt'), times);
 
-  // A lost file is made again; damage is found.
+  // The daemon makes a lost file again, and finds damage.
   rmSync(object(d, 'meshopt', id));
   assert.ok((await d.get(`${url}&profile=meshopt`)).bytes.equals(bytes));
   rmSync(object(d, 'meshopt', id));
@@ -99,7 +99,7 @@ test('both routes serve each profile, which is made once', async (t) => {
   assert.match(found.stdout, /its profile "quantized" \(1000 bytes\) does not match its hash/);
   await d.start();
 
-  // They leave with the supermesh.
+  // Profiles are deleted with the supermesh.
   assert.equal((await d.delete(`/v1/supermeshes/${id}`)).status, 204);
   for (const profile of ['quantized', 'meshopt']) {
     assert.ok(!existsSync(object(d, profile, id)));

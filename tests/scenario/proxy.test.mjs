@@ -174,8 +174,8 @@ for (const name of Object.keys(setUps))
     assert.equal(b.status, 201, b.bytes.toString());
     assert.equal(b.json.bytes, two.length);
 
-    // A long poll is held, and answered when the job has ended; events come one by one, the proxy keeps none back. The
-    // job takes longer than anybody waits, and is cancelled.
+    // The proxy holds a long poll and answers it when the job has ended; events arrive one by one, since the proxy does
+    // not buffer them. The job takes longer than anyone waits, and is cancelled.
     const c = await ask('/v1/meshes?name=large', { method: 'POST', body: shapes.binaryPly(shapes.egg(5)) });
     assert.equal(c.status, 201, c.bytes.toString());
     const job = (await ask('/v1/embeddings', json({ mesh: c.json.id, ...endless }))).json;
@@ -191,7 +191,7 @@ for (const name of Object.keys(setUps))
     assert.equal((await poll).json.state, 'cancelled');
     assert.match((await stream).bytes.toString(), /^event: ?cancelled/m);
 
-    // The result by ranges, with the conditions and headers of the daemon.
+    // The result in ranges, with the conditions and headers of the daemon.
     const made = await ask('/v1/supermeshes', {
       ...json({ shapes: [{ mesh: a.json.id }, { mesh: b.json.id }], remesh: { method: 'adaptive', tolerance: 0.05 } }),
       headers: { 'content-type': 'application/json', prefer: 'wait=60' },
@@ -214,7 +214,7 @@ for (const name of Object.keys(setUps))
       413,
     );
 
-    // What is the operator's stays inside, in any spelling.
+    // The operator's routes stay inside, in any spelling.
     for (const target of [
       '/metrics',
       '/%6detrics',
@@ -299,7 +299,7 @@ test('nginx keeps signed morphs', { skip: !programs.nginx && 'nginx is not insta
     child.kill('SIGTERM');
     await exited;
   });
-  // Not fetch(), which chooses Accept-Encoding itself, and nginx keeps each coding on its own.
+  // Not fetch(), which chooses Accept-Encoding itself; nginx caches each coding separately.
   const ask = (target, headers) =>
     new Promise((resolve, reject) => {
       const r = http.get(`http://127.0.0.1:${port}${target}`, { headers }, (reply) => {
@@ -314,7 +314,7 @@ test('nginx keeps signed morphs', { skip: !programs.nginx && 'nginx is not insta
     assert.ok(Date.now() < until, log);
   const requests = async () => Number(/requests=(\d+)/.exec(await admin('key', 'list'))[1]);
   const url = await signUrl(`/v1/morph.glb?shapes=${ids}&align=rotate&tolerance=0.05`, { key, secret, expires: '1d' });
-  // Many visitors at once, of a morph that nobody has computed: one request reaches the daemon.
+  // Many visitors at once of a morph that has not been computed: one request reaches the daemon.
   const answers = await Promise.all(Array.from({ length: 16 }, () => ask(url)));
   for (const answer of answers) {
     assert.equal(answer.status, 200, log);

@@ -1,4 +1,5 @@
-// The quota of derived bytes: what a tenant's jobs make counts, is refused beyond the quota, and comes back.
+// The quota of derived bytes: the results of a tenant's jobs count, are refused beyond the quota, and stop counting
+// when they are deleted.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import test from 'node:test';
@@ -20,7 +21,7 @@ async function tenants(t, ...args) {
   const upload = async (who, k) => (await d.post('/v1/meshes', ball(k), who)).json.id;
   const embed = async (who, mesh, k, wait = 30) =>
     d.post('/v1/embeddings', vary(mesh, k), { headers: { ...who.headers, prefer: `wait=${wait}` } });
-  /** The bytes of all spheres of a tenant, by the length of what is served. */
+  /** The bytes of all spheres of a tenant: the sum of the lengths of the served files. */
   const stored = async (who) => {
     let sum = 0;
     const { embeddings } = (await d.get('/v1/embeddings', { ...who, query: { limit: 200 } })).json;
@@ -196,7 +197,7 @@ test('usage: what a tenant stores, may store, runs and has used', async (t) => {
     /^ann: [\d,]+ bytes in 1 mesh, [\d,]+ of 7,340,032 bytes of results, 0 jobs running and 0 queued, \d+\.\d worker seconds, 0 crashes\n$/,
   );
 
-  // However many tenants there are, the metrics name 50 of them and add up the others.
+  // For any number of tenants, the metrics name 50 of them and add up the others.
   const { id } = (await d.post('/v1/meshes', ball(1), bob)).json;
   assert.equal(id, mesh);
   for (let k = 0; k < 52; k++) {

@@ -1,5 +1,5 @@
-// A data folder on a read-only file system, as after errors of the disk: the daemon says so, at the start and while
-// it runs. The test mounts file systems; it is skipped where that is not allowed.
+// A data folder on a read-only file system, as after errors of the disk: the daemon reports it, at its start and while
+// it runs. The test mounts file systems; it is skipped if that is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
@@ -32,7 +32,8 @@ test('a read-only data folder is named as such', async (t) => {
   const verbose = async () => (await d.get('/readyz?verbose')).json.read_only;
   assert.equal(await verbose(), false);
 
-  // A read-only mount over the folder: whatever the daemon opens from now on is read-only. (Its catalogue is open.)
+  // A read-only mount over the folder: every file that the daemon opens from now on is read-only. (Its catalogue is
+  // already open.)
   const lock = () => {
     execFileSync('mount', ['--bind', data, data]);
     execFileSync('mount', ['-o', 'remount,ro,bind', data]);

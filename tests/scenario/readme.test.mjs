@@ -9,7 +9,7 @@ import { documents, place, shellLines } from './support/documents.mjs';
 import { daemon, patience, root, samples, slow } from './support/daemon.mjs';
 import { morphOf, parseGlb } from './support/glb.mjs';
 
-/** What a document's lines must have left behind, and said. */
+/** The files that a document's lines must leave behind, and the output that they must print. */
 const expected = {
   'README.md': async (at, out) => {
     for (const name of ['morph.glb', 'dog-giraffe.glb'])
@@ -40,18 +40,20 @@ const expected = {
 for (const file of await documents()) {
   let lines = await shellLines(file);
   if (!lines) continue;
-  // The cookbook makes dozens of morphs: minutes with sanitizers, where its routes are met by other tests as well.
+  // The cookbook makes dozens of morphs, which takes minutes with sanitizers; other tests use its routes as well.
   const skip = slow && file === 'docs/cookbook.md' && 'run in the release build';
   test(`every line of ${file} works`, { skip }, async (t) => {
     const d = await daemon(t);
     const { at, env } = await place(t, d);
-    // The longest wait that a request may ask for is a minute: what takes so long with sanitizers is there beforehand.
+    // The longest wait that a request may ask for is a minute; results that take longer with sanitizers are computed
+    // beforehand.
     if (slow && file === 'README.md') {
       const shapes = [await d.mesh(path.join(samples, 'dog.obj')), await d.mesh(path.join(samples, 'giraffe.off'))];
       const { landmarks } = JSON.parse(await readFile(path.join(samples, 'dog-giraffe.json'), 'utf8'));
       await d.made('/v1/supermeshes', { shapes: shapes.map(({ id, name }) => ({ mesh: id, name })), landmarks });
     }
-    // Landmarks that the tutorial writes by hand are vertices of the files in the tree; coarser animals have their own.
+    // Landmarks that the tutorial writes by hand are vertices of the files in the tree; coarser animals have their own
+    // landmarks.
     if (process.env.ORB_SAMPLES && file === 'docs/tutorial.md') {
       const written = lines;
       lines = lines.replace(

@@ -9,7 +9,7 @@ import * as real from './support/real.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const skip = real.there ? false : 'no real meshes';
-const few = ['cow-spot', 'shrec397-shrec398', 'human_man-penguin']; // what a build with sanitizers is given
+const few = ['cow-spot', 'shrec397-shrec398', 'human_man-penguin']; // the pairs for a build with sanitizers
 
 test('every pair merges', { skip }, async (t) => {
   const d = await daemon(t);
@@ -21,7 +21,7 @@ test('every pair merges', { skip }, async (t) => {
       const request = {
         shapes: meshes.map((m) => ({ mesh: m.id, name: m.name })),
         landmarks: pair.landmarks,
-        asset: { fit: 'none' }, // landmarks are looked up where the files have them
+        asset: { fit: 'none' }, // keeps the positions of the files, at which the test looks up landmarks
       };
       const result = await d.make('/v1/supermeshes', request);
       assert.ok(result.resource, JSON.stringify(result.problem));
@@ -69,7 +69,7 @@ test('every pair merges', { skip }, async (t) => {
   }
 });
 
-// Both files stand with y up. Without landmarks the cow's head may go to a leg of Spot; the verdict then says so.
+// Both files have y up. Without landmarks the cow's head may go to a leg of Spot; the verdict then says so.
 test('a match of two standing animals leaves both standing', { skip: skip || (slow && 'takes minutes') }, async (t) => {
   const d = await daemon(t);
   const cow = real.pairs().find((pair) => pair.name === 'cow-spot');

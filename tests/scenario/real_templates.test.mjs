@@ -1,5 +1,6 @@
-// Real meshes as templates: vertices, their order, corners and attributes stay, bit for bit. The readers here are not
-// orbmorph's, and the Khronos validator has nothing to say that it does not say of the upload. ORB_TEMPLATE_MOST: the largest mesh, in triangles; tests/long.sh takes all of them.
+// Real meshes as templates: vertices, their order, corners and attributes stay, bit for bit. This test has its own
+// readers, and the Khronos validator reports nothing that it does not report for the upload. ORB_TEMPLATE_MOST: the
+// largest mesh, in triangles; tests/long.sh takes all of them.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import test from 'node:test';
@@ -44,7 +45,7 @@ function readStl(bytes) {
   return { positions, corners: positions.map((_, i) => i) };
 }
 
-/** ASCII, three corners a face. */
+/** ASCII, three corners per face. */
 function readOff(text) {
   const words = text.replace(/#.*$/gm, '').trim().split(/\s+/).slice(1).map(Number);
   const [vertices, faces] = words;
@@ -56,7 +57,7 @@ function readOff(text) {
   return { positions, corners: lists.flatMap((list) => list.slice(1)) };
 }
 
-/** Binary: three floats a vertex, then lists of three 32-bit integers. */
+/** Binary: three floats per vertex, then lists of three 32-bit integers. */
 function readPly(bytes) {
   const start = bytes.indexOf('end_header\n') + 11;
   const head = bytes.toString('latin1', 0, start);

@@ -1,4 +1,4 @@
-// Requests that are wrong in every way that HTTP and JSON allow.
+// Requests that are invalid in every way that HTTP and JSON allow.
 import assert from 'node:assert/strict';
 import net from 'node:net';
 import path from 'node:path';
@@ -6,7 +6,7 @@ import test from 'node:test';
 import { daemon, samples, assertProblem, patience } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-/** Sends bytes as they are; resolves to all that comes back until the connection closes. */
+/** Sends bytes unchanged; resolves to everything received until the connection closes. */
 function raw(d, text, { wait = 60_000 } = {}) {
   const { hostname, port } = new URL(d.url);
   return new Promise((resolve, reject) => {
@@ -43,7 +43,7 @@ test('a query or headers of any length get one answer at once', async (t) => {
     assert.equal(statusOf(reply), status, `${what}: ${reply}`);
     if (type) assert.match(reply, new RegExp(`"type":"/problems/${type}"`), what);
   };
-  // Around the 16 KB of a connection's memory, and far beyond.
+  // Sizes around the 16 KB of a connection's memory, and far beyond.
   for (const size of [1000, 10_000]) await answers(await ask(`a=${'x'.repeat(size)}`), 400, 'bad-query', size);
   for (const size of [10_400, 12_000, 15_000, 16_000, 16_250])
     await answers(await ask(`a=${'x'.repeat(size)}`), 414, 'uri-too-long', size);
@@ -85,7 +85,7 @@ test('headers of very many short lines or cookies get one answer, however many t
   };
   for (const [what, make] of Object.entries(kinds)) {
     const seen = new Set();
-    // Each number around the one that fills the 16 KB of a connection.
+    // Each number near the one that fills the 16 KB of a connection.
     for (let n = 60; n <= 260; n++) {
       const reply = await ask(make(n));
       assert.equal(reply.split('HTTP/1.1 ').length, 2, `${n} ${what}: ${reply}`);

@@ -1,5 +1,5 @@
 // Objects in S3: what the daemon refuses at its start, what it keeps in its cache, and what happens when S3 goes away.
-// Runs under tests/tools/with_s3.sh. Other scenarios run there as they do with files.
+// Runs under tests/tools/with_s3.sh. The other scenarios run there in the same way as with files.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
@@ -14,7 +14,7 @@ import { busy, flipped, half, late, lost, s3Proxy, short } from './support/s3_pr
 import { tetrahedron } from './support/shapes.mjs';
 
 const server = process.env.ORB_S3;
-const program = process.env.ORB_DAEMON; // that starts with objects in files
+const program = process.env.ORB_DAEMON; // starts a daemon with objects in files
 assert.ok(server && program, 'to be run by tests/tools/with_s3.sh');
 let pid = Number(process.env.ORB_S3_PID);
 
@@ -49,7 +49,7 @@ async function stored(t, prefix, ...args) {
 /** The same behind a proxy that answers as `decide` says. */
 async function troubled(t, prefix, decide) {
   const proxy = await s3Proxy(t, server, decide);
-  // The scrub reads objects, too: what `decide` does to its requests the test's own would not meet.
+  // The scrub also reads objects: `decide` would act on its requests instead of the test's own.
   const args = ['--scrub-rate', '0', '--objects', `s3://objects/${prefix}?endpoint=${proxy.url}&part_mib=5`];
   const d = await daemon(t, { args });
   const empty = () => rm(path.join(d.data, 'cache'), { recursive: true }).then(() => mkdir(path.join(d.data, 'cache')));
@@ -132,7 +132,7 @@ test('a damaged object in the bucket is found, and made again', async (t) => {
   const sphere = `/v1/embeddings/${embedding.id}/sphere.ply`;
   const { bytes } = await d.get(sphere);
   const key = await keyOf('damaged', 'sphere', embedding.id);
-  // As a disk of S3 would alter it: the hash beside it stays.
+  // The object changes as on a damaged disk of S3: the hash beside it stays.
   const meta = { sha256: (await s3(server, 'GET', `objects/${key}`)).headers.get('x-amz-meta-sha256') };
   assert.match(meta.sha256, /^[0-9a-f]{64}$/);
   const altered = Buffer.from(bytes);
@@ -147,7 +147,7 @@ test('a damaged object in the bucket is found, and made again', async (t) => {
   await d.made('/v1/embeddings', request);
   assert.ok((await d.get(sphere)).bytes.equals(bytes));
 
-  // As someone who writes to the bucket would alter it: with the hash of the wrong bytes.
+  // The object changes as by an attacker who can write to the bucket: with the hash of the wrong bytes.
   await d.stop();
   await empty();
   const { createHash } = await import('node:crypto');
@@ -259,7 +259,7 @@ test('the cache stays within its bound', async (t) => {
 });
 
 test('each request that fails is tried again: 503, lost answers, half a body, wrong bytes', async (t) => {
-  // Each request fails three times in a row, each time in another way.
+  // Each request fails three times in a row, each time in a different way.
   const ways = { GET: [half, busy, late], PUT: [busy, lost, late], HEAD: [lost, busy, late], DELETE: [lost] };
   const { d, empty, proxy } = await troubled(t, 'troubled', ({ method, path, tries }) =>
     path.endsWith('orbmorph-owner') ? undefined : ways[method]?.[tries - 1],
@@ -279,7 +279,7 @@ test('each request that fails is tried again: 503, lost answers, half a body, wr
     );
   assert.doesNotMatch(d.log, /S3 is unreachable/);
 
-  // Bytes that are wrong on the way only: read again, and the object stays.
+  // Bytes that are damaged only in transit: the daemon reads them again, and the object stays.
   for (const way of [short, flipped]) {
     const name = way === short ? 'one' : 'two';
     const { id } = (await d.upload(Buffer.from(`${tetrahedron}# ${name}\n`))).json;
@@ -297,7 +297,7 @@ test('a large object goes in parts, each tried again, and is put together once',
   const part = 5 << 20;
   const { d, empty, proxy } = await troubled(t, 'large', ({ method, query, tries }) => {
     if (/partNumber=2/.test(query)) return tries === 1 ? busy : tries === 2 ? lost : undefined;
-    return method === 'POST' && /^uploadId=/.test(query) && tries === 1 ? late : undefined; // it has put it together
+    return method === 'POST' && /^uploadId=/.test(query) && tries === 1 ? late : undefined; // it has assembled it
   });
   const body = Buffer.concat([Buffer.alloc(part + 1000, '# padding\n'), Buffer.from(`\n${tetrahedron}`)]);
   const reply = await d.upload(body);
@@ -316,7 +316,7 @@ test('a large object goes in parts, each tried again, and is put together once',
   assert.ok((await d.get(`/v1/meshes/${reply.json.id}/file`)).bytes.equals(body));
   assert.doesNotMatch(d.log, /S3 is unreachable/);
 
-  // S3 that stays in trouble: the upload is refused, nothing of it stays, and it works later.
+  // S3 that keeps failing: the upload is refused, nothing of it stays, and it works later.
   proxy.decide = ({ query }) => (/partNumber=2/.test(query) ? busy : undefined);
   const other = Buffer.concat([body, Buffer.from('# other\n')]);
   assertProblem(await d.upload(other), 503, 'unavailable');

@@ -1,5 +1,5 @@
-// The scrub in the background: what it finds wrong in the data folder, where it reports that, and how it is repaired;
-// lost+found.
+// The scrub in the background: the damage that it finds in the data folder, where it reports it, and how the daemon
+// repairs it; lost+found.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import {
@@ -55,7 +55,7 @@ test('the scrub finds and reports damage to files that nobody requests, and it c
   assert.deepEqual(found, { ...found, catalogue: 'ok', quarantined: 0, missing: 0, unreadable: 0, without_row: 0 });
   assert.ok(found.scrubbed_objects >= 2 + 2 + 3, JSON.stringify(found)); // meshes, embeddings, parts of the morph
 
-  // A mesh: only its owner has it, so it stays missing until it is sent again.
+  // A mesh: only its owner has its file, so it stays missing until the owner sends it again.
   flip(object(d, 'mesh', meshes[0].id));
   found = await round(d);
   assert.deepEqual([found.quarantined, found.missing], [1, 1]);
@@ -68,7 +68,7 @@ test('the scrub finds and reports damage to files that nobody requests, and it c
   assert.equal((await d.upload(texts[0])).status, 200);
   assert.equal((await d.get(`${meshes[0].url}/file`)).bytes.toString(), texts[0]);
 
-  // What jobs make: the row goes with the damaged object, so the same request makes it again.
+  // Results of jobs: the row is deleted with the damaged object, so the same request computes it again.
   let wrong = 1;
   for (const kind of ['asset', 'places', 'spheres']) {
     flip(object(d, kind, morph.id));
@@ -109,7 +109,7 @@ test('a morph by URL whose asset or embedding was damaged is computed again with
     assert.equal(reply.status, 200, `${query}: ${reply.bytes}`);
     assert.deepEqual(reply.bytes, bytes, query);
   }
-  // A damaged embedding is computed again by the job that needs it.
+  // The job that needs a damaged embedding computes it again.
   const [embedding] = (await d.get('/v1/embeddings')).json.embeddings;
   flip(object(d, 'sphere', embedding.id));
   assert.equal((await d.get(`${url}&tolerance=0.01`)).status, 200);
@@ -119,7 +119,7 @@ test('a morph by URL whose asset or embedding was damaged is computed again with
 test('a catalogue that is damaged while the daemon runs makes /readyz answer 503', async (t) => {
   const d = await daemon(t, { args: fast });
   for (let k = 0; k < 30; k++) assert.equal((await d.upload(mesh(k))).status, 201);
-  await d.stop(); // all is in the file, nothing in the WAL
+  await d.stop(); // everything is in the file, nothing in the WAL
   await d.start();
   assert.equal((await d.get('/readyz')).status, 200);
   const file = path.join(d.data, 'catalogue.sqlite');
@@ -153,7 +153,7 @@ test('meshes whose rows a cut WAL lost are reported, and --gc keeps their files 
   assert.equal(await metric(d, 'orbmorph_objects_without_row'), lost.length);
   assert.match(d.log, new RegExp(`"level":"warn".*scrub: ${lost.length} stored files have no row in the catalogue`));
 
-  // Sending one again is enough for that one.
+  // Sending one mesh again repairs that mesh.
   assert.equal((await d.upload(texts[ids.indexOf(lost[0])])).status, 201);
   assert.equal((await round(d)).without_row, lost.length - 1);
   await d.stop();
@@ -167,7 +167,7 @@ test('meshes whose rows a cut WAL lost are reported, and --gc keeps their files 
   }
   assert.equal(existsSync(object(d, 'mesh', lost[1])), false);
 
-  // What is there for longer than lost-days goes, and no sooner.
+  // Files that have been there for longer than lost-days are deleted, and no sooner.
   const day = 86400;
   const age = (id, days) => utimesSync(aside(id), Date.now() / 1000 - days * day, Date.now() / 1000 - days * day);
   age(lost[1], 3.1);

@@ -1,5 +1,5 @@
-// Signed URLs: what a signature opens and for how long, keys and their limits, and the lines of docs/assets-by-url.md for
-// other languages.
+// Signed URLs: what a signature gives access to and for how long, keys and their limits, and the lines of
+// docs/assets-by-url.md for other languages.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { createHmac } from 'node:crypto';
@@ -12,7 +12,7 @@ import { assertProblem, binaries, daemon, root } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const now = () => Math.floor(Date.now() / 1000);
-/** Signs by the words of the contract, without the client. */
+/** Signs as the contract describes it, without the client. */
 function sign(target, { name, secret }, expires = now() + 3600) {
   const whole = `${target}${target.includes('?') ? '&' : '?'}key=${name}&expires=${expires}`;
   return `${whole}&signature=${createHmac('sha256', secret).update(whole).digest('hex')}`;
@@ -58,7 +58,7 @@ test('a signed URL is served without a token, and computes what nobody has compu
   assert.ok(again.bytes.equals(first.bytes));
   assert.equal((await d.request('HEAD', url)).status, 200);
   assert.equal((await d.get(url, { headers: { range: 'bytes=0-3' } })).status, 206);
-  // It belongs to the tenant, whose token sees it and its job.
+  // The supermesh belongs to the tenant, whose token sees it and its job.
   const [, id] = /supermeshes\/(\w+)/.exec(first.headers.get('link'));
   assert.equal((await d.get(`/v1/supermeshes/${id}`, { headers })).status, 200);
   assert.equal((await d.get('/v1/jobs', { headers })).json.jobs.length, 1);
@@ -81,7 +81,7 @@ test('a changed character, another key and an expired date are refused', async (
   const other = await keyOf(d, 'other', '--tenant', 'shop');
   const url = sign(target, key);
   assert.equal((await d.get(url)).status, 200);
-  // Each character by itself; the path decides which route it is.
+  // Each character alone; the path decides which route it is.
   for (let i = url.indexOf('?') + 1; i < url.length; i++) {
     const c = url[i] === '0' ? '1' : '0';
     const reply = await d.get(`${url.slice(0, i)}${c}${url.slice(i + 1)}`);
@@ -148,7 +148,7 @@ test('keys are added, rotated and removed while the daemon runs', async (t) => {
     assert.equal((await d.get(sign(target, key))).status, 200, 'both are valid for an hour');
   await admin(d, 'key', 'rotate', 'web', '--overlap', '0s');
   for (const key of [old, { ...old, secret }]) assertProblem(await d.get(sign(target, key)), 403, 'bad-signature');
-  // Over a restart.
+  // Across a restart.
   const [, third] = /:(\w+)/.exec(await admin(d, 'key', 'rotate', 'web'));
   await d.stop();
   await d.start();
@@ -209,7 +209,8 @@ test('requests and work of a key are bounded by day', async (t) => {
   assertProblem(await d.get(sign(target, few)), 429, 'quota-exceeded', 'a restart forgets nothing');
   assert.match(await admin(d, 'key', 'list'), /^few .*requests=3\/3/m);
 
-  // A second of work: the first morph may take longer, the next one is refused, and what exists is still served.
+  // A limit of a second of work: the first morph may take longer, the next one is refused, and existing morphs are
+  // still served.
   const poor = await keyOf(d, 'poor', '--tenant', 'shop', '--cpu-seconds-per-day', '1');
   const more = (tolerance) => sign(`${target.replace('0.05', tolerance)}&preset=quality`, poor);
   let refused;
@@ -256,7 +257,7 @@ test('the command line and the client sign as the daemon checks', async (t) => {
       assert.equal((await d.get(url)).status, 200, url);
     }
   }
-  // What a browser would send in another form is signed in that form.
+  // Targets that a browser would send in another form are signed in that form.
   const raw = `${target}&names=Kätzchen,a b`;
   assert.equal((await d.get(await signUrl(raw, { key: 'web', secret: key.secret, expires: '1h' }))).status, 200);
   for (const [at, args] of [

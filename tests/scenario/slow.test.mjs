@@ -6,7 +6,7 @@ import { setTimeout as sleep } from 'node:timers/promises';
 import { assertProblem, daemon, endless, patience, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-/** A plain connection: what came so far, and its end. */
+/** A plain connection: the bytes received so far, and its end. */
 function connect(d, t) {
   const { hostname, port } = new URL(d.url);
   const c = { text: '', bytes: 0, closed: false, socket: net.connect(Number(port), hostname) };
@@ -47,7 +47,7 @@ test('slow headers and bodies', async (t) => {
       '1\r\n \r\n',
     ),
   ]);
-  // Slow, but not too slow: 4 kB/s over more than two looks, where 100 would do.
+  // Slow, but not too slow: 4 kB/s over more than two checks, where 100 bytes would suffice.
   const fine = connect(patient, t);
   const text = `${shapes.tetrahedron}${'#'.repeat(27_000)}\n`;
   const began = Date.now();
@@ -75,12 +75,12 @@ test('responses that nobody reads, and clients that wait', async (t) => {
     await d.upload(shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y)), 1.5 * y, z])))
   ).json;
   await d.stop();
-  d.args.push(...HURRY); // for what follows, which is slow on purpose
+  d.args.push(...HURRY); // for the rest of the test, which is slow on purpose
   await d.start();
   const stuck = connect(d, t);
   stuck.socket.pause();
   stuck.socket.write(`GET ${url}/file HTTP/1.1\r\nHost: localhost\r\n\r\n`);
-  // A stream, a poll and a kept connection, all silent for as long, are not slow.
+  // A stream, a poll and a kept connection that are silent for as long do not count as slow.
   const jobs = [];
   for (const area of [2, 3])
     jobs.push(
@@ -154,7 +154,7 @@ test('limits of requests and connections for an address', async (t) => {
   await until(async () => {
     const late = connect(d, t);
     late.socket.write('GET /v1/meshes HTTP/1.1\r\nHost: localhost\r\n\r\n');
-    await Promise.race([late.ended, sleep(2000)]); // answered: it came before some of the many were seen
+    await Promise.race([late.ended, sleep(2000)]); // answered: it arrived before some of the others were seen
     return late.closed && /^HTTP\/1\.1 429 [\s\S]*more than 20 open connections/.test(late.text);
   }, 'refused and closed');
   const alive = connect(d, t);

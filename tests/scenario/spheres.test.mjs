@@ -26,7 +26,7 @@ async function spheresOf(d, supermesh) {
   return all;
 }
 
-/** The sphere's surface is the file's: its vertices are there, and its area is the same. */
+/** The sphere's surface is the file's surface: it has the same vertices and the same area. */
 function isSurfaceOf(sphere, source, what) {
   const met = new Set();
   for (const v of sphere.vertices) {

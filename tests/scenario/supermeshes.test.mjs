@@ -16,7 +16,7 @@ async function animals(d, ...files) {
   return meshes.map((m) => ({ mesh: m.id, name: m.name }));
 }
 
-/** What holds for every supermesh, whatever the method. */
+/** Asserts what holds for every supermesh with every method. */
 async function check(d, supermesh, sources, landmarks) {
   assert.equal(supermesh.triangles, 2 * supermesh.vertices - 4);
   assert.equal(supermesh.certificate.closed, true);
@@ -78,7 +78,7 @@ test('two animals with landmarks, from requests to the asset', async (t) => {
     assert.ok(s.rms_relative <= s.hausdorff_relative);
   }
 
-  // The asset as the contract describes it.
+  // The asset, compared with the contract.
   const { gltf, names } = morph;
   assert.deepEqual(names, ['giraffe']);
   assert.equal(gltf.asset.version, '2.0');
@@ -88,13 +88,13 @@ test('two animals with landmarks, from requests to the asset', async (t) => {
   const weights = morph.read(gltf.animations[0].samplers[0].output);
   assert.ok(weights.includes(0) && weights.includes(1), 'each shape alone has a keyframe');
 
-  // Again: at once. With other options: the embeddings are known.
+  // The same request again gets its answer at once. With other options the embeddings are known.
   const second = await d.make('/v1/supermeshes', request);
   assert.equal(second.status, 200);
   assert.deepEqual(second.resource, supermesh);
   assert.deepEqual((await d.get(supermesh.url)).json, supermesh);
   assert.equal(Object.values((await d.get('/v1/embeddings')).json).find(Array.isArray).length, 2);
-  // Several nodes answer by turns, each with what it has computed.
+  // Several nodes answer in turn, each with its own results.
   const embedded = async () => {
     let count = 0;
     for (let i = 0; i < Number(process.env.ORB_NODES ?? 1); i++)
@@ -117,7 +117,7 @@ test('two animals with landmarks, from requests to the asset', async (t) => {
   assert.notEqual(swapped.id, supermesh.id, 'the order of shapes belongs to the identity');
 });
 
-/** Where the limbs of the standing dog are. */
+/** The limbs of the standing dog. */
 const LIMBS = {
   head: (x, y) => x > 0.8 && y > 1,
   tail: (x, y) => x < -0.8 && y > 0.6,
@@ -151,7 +151,7 @@ test('correspondence without landmarks', async (t) => {
     for (const [s, place] of l.at.entries()) {
       assert.ok(place.triangle < sources[s].triangles.reduce((sum, face) => sum + face.length - 2, 0));
       assert.ok(Math.abs(place.barycentric.reduce((a, b) => a + b) - 1) < 1e-9);
-      // Within the tolerance of the surface, but what was omitted from it lets the place slide along it.
+      // Within the tolerance of the surface, but the omitted parts let the place slide along it.
       assert.ok(l.residual_relative[s] < 0.01, `${l.name}: ${l.residual_relative}`);
     }
   });
@@ -249,7 +249,7 @@ test('methods of alignment and of remeshing', async (t) => {
       built.push(method);
       await check(d, result.resource, sources, landmarks);
     } else {
-      // What is not built is refused by the request itself, and no job is made of it.
+      // A request for something that is not built is refused at once, and no job is created.
       assert.equal(result.status, 422, `${method}: ${JSON.stringify(result)}`);
       assert.equal(result.problem.type, '/problems/unsupported-method');
       assert.equal(result.problem.method, method);

@@ -1,4 +1,4 @@
-// A landmark that is misplaced is named, with a place that is nearer to the true one; true landmarks are not named.
+// Misplaced landmarks are named, with a place nearer to the true one; true landmarks are not named.
 import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';

@@ -17,13 +17,14 @@ async function folder(t) {
   return made;
 }
 
-// What systemd does before it starts a service with a socket: listens, puts it at descriptor 3, says so to this process.
+// What systemd does before it starts a service with a socket: it listens, puts the socket at descriptor 3, and tells
+// this process.
 const PASS = `use POSIX; use Socket; $^F = 9; my ($host, $port, $count) = splice @ARGV, 0, 3;
   socket(S, PF_INET, SOCK_STREAM, 0); setsockopt(S, SOL_SOCKET, SO_REUSEADDR, 1);
   bind(S, sockaddr_in($port, inet_aton($host))) or die "bind: $!"; $count < 0 or listen(S, 64) or die;
   POSIX::dup2(fileno(S), 3); $ENV{LISTEN_PID} = $$; $ENV{LISTEN_FDS} = abs $count; exec @ARGV`;
 
-/** Starts orbmorphd, perhaps with a socket passed on; resolves once it is ready or has ended. */
+/** Starts orbmorphd, optionally with a socket passed on; resolves once it is ready or has ended. */
 async function start(t, args, { env = {}, pass } = {}) {
   const [command, ...rest] = [...(pass ? ['perl', '-e', PASS, ...pass.map(String)] : []), binaries.daemon, ...args];
   const child = spawn(command, rest, { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, ...env } });
@@ -64,14 +65,14 @@ test('a Unix socket', async (t) => {
   assert.equal((await second.exited).code, 1);
   assert.match(second.log, /another process listens/);
   assert.equal((await get({ socketPath: at })).status, 200, 'the first one goes on');
-  // What a killed one leaves is no hindrance.
+  // The socket file of a killed daemon does not stop the next one.
   d.child.kill('SIGKILL');
   await d.exited;
   assert.ok((await lstat(at)).isSocket());
   d = await start(t, args);
   assert.equal((await lstat(at)).mode & 0o777, 0o660);
   assert.equal((await get({ socketPath: at })).status, 200);
-  // The command line reaches it, whatever proxy the environment names.
+  // The command line reaches it with any proxy in the environment.
   const client = (...args) => runProgram(binaries.client, [...args], { env: { http_proxy: 'http://127.0.0.1:9' } });
   const ran = await client('upload', '-s', `unix:${at}`, path.join(samples, 'dog.obj'));
   assert.equal(ran.code, 0, ran.err);
@@ -122,7 +123,7 @@ test('a socket that systemd passes', async (t) => {
     assert.equal((await d.exited).code, 1);
     assert.match(d.log, why);
   }
-  // Of another process: not for us.
+  // Variables for another process: the daemon ignores them.
   const d = await start(t, ['--data', data, '--listen', '127.0.0.1:0'], { env: { LISTEN_PID: '1', LISTEN_FDS: '1' } });
   assert.match(d.out, /listening/, d.log);
 });

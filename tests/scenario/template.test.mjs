@@ -19,7 +19,9 @@ const diagonalOf = (points) =>
 const pointsOf = (morph, s) =>
   Array.from({ length: morph.count }, (_, v) => [0, 1, 2].map((k) => morph.shapes[s][3 * v + k]));
 
-/** That the base is `source` bit for bit, as float32, and that each vertex of target s lies on `targets[s - 1]`. */
+/**
+ * Asserts that the base is `source` bit for bit, as float32, and that each vertex of target s lies on `targets[s - 1]`.
+ */
 function assertKept(morph, source, targets) {
   assert.deepEqual(morph.shapes[0].slice(0, 3 * source.positions.length), source.positions.flat().map(Math.fround));
   assert.deepEqual(morph.triangles, source.triangles.flat());
@@ -74,8 +76,8 @@ function smoothNormalAt(point, faces, normals) {
 }
 
 /**
- * The cosine between a triangle and the surface at its corners, which lie on it. The centre may be far from the surface,
- * and nearest to a part of it on which the triangle does not lie; and beside an edge, a flat face tells one side only.
+ * The cosine between a triangle and the surface at its corners, which lie on it. The centre may be far from the surface
+ * and nearest to another part of it; and at an edge, a flat face represents only one side.
  */
 function facingOf(triangle, faces, normals) {
   const smooth = sumOf(triangle.map((corner) => smoothNormalAt(corner, faces, normals)));
@@ -83,7 +85,10 @@ function facingOf(triangle, faces, normals) {
   return normal.reduce((total, x, k) => total + x * smooth[k], 0) / (Math.hypot(...normal) * Math.hypot(...smooth));
 }
 
-/** That the inverted triangles of a pair are counted, and the largest named by their numbers in the file. Returns how many. */
+/**
+ * Asserts that the inverted triangles of a pair are counted, and the largest named by their numbers in the file.
+ * Returns how many there are.
+ */
 function assertNamed({ a, b, inverted_fraction, inverted_count, inverted_triangles }, triangles, morph, sources) {
   assert.ok(inverted_fraction < 0.05);
   assert.equal(inverted_fraction, inverted_count / triangles);
@@ -93,7 +98,7 @@ function assertNamed({ a, b, inverted_fraction, inverted_count, inverted_triangl
   const shown = inverted_triangles.map((t) => places.map((points) => sources[0].triangles[t].map((v) => points[v])));
   const normals = faces.map(smoothNormalsOf);
   const facing = shown.map((pair) => Math.min(...pair.map((triangle, i) => facingOf(triangle, faces[i], normals[i]))));
-  // The others face their surface with a cosine near 1. The daemon weighs normals by its own rule, hence the margin.
+  // The others face their surface with a cosine near 1. The daemon weights normals by its own rule, hence the margin.
   assert.ok(Math.max(-1, ...facing) < 0.05, `${facing}`);
   const sizes = shown.map((pair) => Math.max(...pair.map((triangle) => Math.hypot(...normalOf(triangle)))));
   assert.ok(
@@ -135,7 +140,7 @@ test('vertices in their order, a vertex that a seam repeats, and one that no tri
   const d = await daemon(t);
   const base = shapes.egg(2);
   const target = shapes.bean(2);
-  // A seam as exporters write it: the vertices of every third triangle again, with other texture coordinates.
+  // A seam as exporters write it: the vertices of every third triangle are repeated with other texture coordinates.
   const positions = base.positions.map((p) => p.map(Math.fround));
   const uv = positions.map((p) => [Math.fround(p[0] / 4 + 0.5), Math.fround(p[1] / 4 + 0.5)]);
   const normals = positions.map((p) => p.map((x) => Math.fround(x / Math.hypot(...p))));
@@ -179,7 +184,7 @@ test('vertices in their order, a vertex that a seam repeats, and one that no tri
 test('an OBJ vertex with several texture coordinates gets copies after all vertices, which move alike', async (t) => {
   const d = await daemon(t);
   const base = shapes.egg(2);
-  // The first chart has the texture coordinates 1 … n, one a vertex; the second, every third triangle, the next n.
+  // The first chart has the texture coordinates 1 … n, one per vertex; the second, every third triangle, the next n.
   const uv = [0, 1].flatMap((chart) =>
     base.points.map(([x, y]) => [chart / 2 + (x + 1) / 4, (y + 1) / 2].map(Math.fround)),
   );
@@ -232,7 +237,7 @@ test('where the template is too coarse for a shape, its triangles are named, the
   const { shapes: told, asset } = await d.made('/v1/supermeshes', request(tolerance));
   assert.equal(told[0].coarse, undefined);
   const { diagonal, coarse } = told[1];
-  // The same by all pairs of samples and triangles.
+  // The same, computed from all pairs of samples and triangles.
   const made = pointsOf(morphOf((await d.get(asset)).bytes), 1);
   const faces = plain.triangles.map((corners) => corners.map((v) => made[v]));
   const mean = (points) => [0, 1, 2].map((k) => points.reduce((sum, p) => sum + p[k] / points.length, 0));
@@ -262,14 +267,15 @@ test('where the template is too coarse for a shape, its triangles are named, the
   const limit = tolerance * diagonal;
   const expected = errors.filter((x) => x > limit).sort((a, b) => b - a);
   assert.ok(expected.length > 0);
-  // The horn stands on the x axis; its bump falls below a thousandth of the radius 0.36 away from there.
+  // The horn is on the x axis; its bump falls below a thousandth of the radius at a distance of 0.36.
   const axis = ([x, y, z]) => Math.hypot(x / Math.hypot(x, y, z) - 1, y / Math.hypot(x, y, z), z / Math.hypot(x, y, z));
   for (const [i, face] of faces.entries())
     if (errors[i] > limit) assert.ok(Math.min(...face.map(axis)) < 0.36, `triangle ${i} is not at the horn`);
   assert.equal(coarse.count, expected.length);
   assert.equal(coarse.triangles.length, coarse.count);
   coarse.errors_relative.forEach((x, i) => assert.ok(Math.abs(x * diagonal - expected[i]) < 1e-5, `error ${i}`));
-  // Samples at an edge may count for either triangle there, so the named ones are compared as far as they are clear.
+  // Samples at an edge may count for either triangle there, so the named ones are compared only as far as they are
+  // unambiguous.
   assert.equal(coarse.triangles[0], errors.indexOf(Math.max(...errors)));
   for (const i of coarse.triangles) assert.ok(errors[i] > limit, `triangle ${i}`);
   const areaOf = (face) => Math.hypot(...normalOf(face));

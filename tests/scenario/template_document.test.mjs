@@ -1,4 +1,4 @@
-// The remesh method "template" where the first shape came as glTF: the asset is that document with targets.
+// The remesh method "template" if the first shape was glTF: the asset is that document with targets.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { rigged } from '../samples/rigged.mjs';
@@ -22,7 +22,7 @@ async function merge(d, file, query, others, more = {}) {
   return { shapes: meshes, ...options, ...more };
 }
 
-/** That all of `before` is in `after`, but for what targets change. */
+/** Asserts that `after` has everything in `before`, except for what targets change. */
 function assertMembers(before, after, where = '') {
   if (before === null || typeof before !== 'object') assert.equal(after, before, where);
   else
@@ -109,7 +109,7 @@ test('a rigged character stays, and gets two shape keys', async (t) => {
   assert.equal(places.readInt32LE(tail + 12), -1);
 });
 
-/** A node that scales, turns and mirrors, under a parent that moves and scales. */
+/** A node that scales, rotates and mirrors, under a parent that moves and scales. */
 const placed = (gltf) => {
   gltf.nodes = [
     { children: [1], scale: [0.01, 0.01, 0.01], translation: [0, 3, 0] },
@@ -148,7 +148,7 @@ for (const [kind, write] of [
     for (let v = 0; v < points.length; v++) {
       const n = [0, 1, 2].map((k) => normal[3 * v + k] + turn[3 * v + k]);
       assert.ok(Math.abs(Math.hypot(...n) - 1) < 1e-5);
-      const out = [-n[0] / 2, -n[2] / 0.5, n[1]]; // normals go by the inverse transpose
+      const out = [-n[0] / 2, -n[2] / 0.5, n[1]]; // normals transform by the inverse transpose
       const p = points[v];
       inward += out[0] * p[0] + out[1] * (p[1] - 3) + out[2] * p[2] <= 0;
     }

@@ -1,6 +1,6 @@
-// The remesh method "template" where the document's own positions are quantized or sparse: they stay as they are, and the
-// targets are 32-bit floats beside them. Those of a compressed document are unpacked, with the values that decoders
-// written by others read.
+// The remesh method "template" if the document's positions are quantized or sparse: they stay unchanged, and the
+// targets are 32-bit floats beside them. Those of a compressed document are decompressed, with the values that
+// independent decoders read.
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import test from 'node:test';
@@ -41,7 +41,7 @@ async function assetOf(d, file, dropped = [], query = {}) {
   return asset;
 }
 
-/** The same, where all that the file has must be in it. */
+/** The same; the asset must have everything in the file. */
 async function templateOf(d, file, query) {
   const asset = await assetOf(d, file, [], query);
   const [before, after] = [jsonOf(file), jsonOf(asset)];
@@ -54,7 +54,7 @@ async function templateOf(d, file, query) {
   return asset;
 }
 
-/** That base and last target, moved by the node, lie on the target's surface. `base`: 3 a vertex, as decoded. */
+/** Asserts that base and last target, moved by the node, lie on the target's surface. `base`: 3 per vertex, decoded. */
 function assertOnTarget(asset, base) {
   const { gltf, read } = parseGlb(asset);
   const { translation = [0, 0, 0], rotation, scale = [1, 1, 1] } = gltf.nodes.find((node) => node.mesh === 0);
@@ -132,7 +132,7 @@ test('positions compressed by meshoptimizer', async (t) => {
 
   const packed = jsonOf(file);
   await MeshoptDecoder.ready;
-  /** The bytes of an accessor of the upload, decoded, and where its elements are. */
+  /** The bytes of an accessor of the upload, decoded, and the places of its elements. */
   const decoded = (index) => {
     const accessor = packed.accessors[index];
     const view = packed.bufferViews[accessor.bufferView].extensions.EXT_meshopt_compression;

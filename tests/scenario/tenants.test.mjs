@@ -96,7 +96,7 @@ test('a tenant does not see what another one owns', async (t) => {
     assertProblem(await d.delete(thing, viewer), 403, 'forbidden');
     assert.equal((await d.get(thing, ann)).status, 200);
   }
-  // By its id alone nothing can be made of a mesh.
+  // Knowing the id of a mesh is not enough to use it.
   const nobodys = { mesh: '0'.repeat(64) };
   assertSame(
     await d.post('/v1/embeddings', { mesh: a.id }, bob),
@@ -115,9 +115,9 @@ test('a tenant does not see what another one owns', async (t) => {
     assert.deepEqual(await list(admin, what), own);
   }
   assert.deepEqual((await d.get('/v1/jobs', { ...bob, query: { state: 'running' } })).json.jobs, []);
-  // How much there is to do is the operator's business.
+  // Only the operator sees how much work there is.
   await until(async () => (await d.get(running.url, ann)).json.state === 'running', 'it runs');
-  // Of several nodes one runs it, and which one answers is the proxy's choice.
+  // One of several nodes runs it, and the proxy chooses which one answers.
   const running_here = async () => (await d.get('/readyz?verbose', admin)).json.running;
   if (process.env.ORB_NODES) await until(async () => (await running_here()) === 1, 'a node says that it runs a job');
   else assert.equal(await running_here(), 1);
@@ -161,7 +161,7 @@ test('page tokens reveal nothing about other tenants', async (t) => {
   const steps = numbers.slice(1).map((n, i) => n - numbers[i]);
   assert.equal(new Set(steps).size, steps.length, 'no step comes twice');
   assert.ok(steps.some((step) => step < 0n) && steps.some((step) => step > 0n), 'they do not count');
-  // They are of this data folder: good after a restart, and nothing else is one.
+  // Cursors belong to this data folder: they stay valid after a restart, and no others are.
   await d.stop();
   await d.start();
   assert.deepEqual(
@@ -202,7 +202,7 @@ test('an upload does not reveal that another tenant has the same mesh', async (t
   const again = await upload(bob, small, { name: 'other' });
   assert.equal(again.status, 200, 'known to this tenant');
   assert.deepEqual(again.json, second.json);
-  // What cannot be taken is refused to both alike.
+  // A request that cannot be accepted is refused in the same way to both.
   const twice = await Promise.all([ann, bob].map((who) => upload(who, Buffer.from('o nothing\n'))));
   assertSame(twice[0], twice[1], [], 'a bad file');
 });
@@ -214,7 +214,7 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   assert.equal((await upload(bob, large)).status, 201);
   const ask = (who, more) => d.post('/v1/embeddings', { mesh: id, ...more }, who);
 
-  // Bob's job is his own: Ann's ends by her cancel, his goes on.
+  // Bob has his own job: Ann's ends when she cancels it, his goes on.
   const accepted = [await ask(ann, endless), await ask(bob, endless)];
   for (const { status, bytes } of accepted) assert.equal(status, 202, bytes.toString());
   const [his, hers] = accepted.map(({ json }) => json);
@@ -226,10 +226,10 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   await until(async () => (await d.get(hers.url, bob)).json.state === 'running', 'his job runs');
   assert.equal((await d.delete(hers.url, bob)).status, 200);
 
-  // Bob cannot see that Ann has the result already, except by the time that it takes.
+  // Bob cannot see that Ann already has the result, except by the time that it takes.
   const one = await end(ann, (await ask(ann)).json);
-  // The one worker is busy with Ann's job, and Bob's other job runs beside it, while Bob looks: a result that is there
-  // comes at once.
+  // The only worker is busy with Ann's job, and Bob's other job runs beside it, while Bob looks: an existing result
+  // arrives at once.
   const blocker = (await ask(ann, endless)).json;
   await until(async () => (await d.get(blocker.url, ann)).json.state === 'running', 'the worker is busy');
   const beside = (await ask(bob, { ...endless, options: { ...endless.options, step: 0.011 } })).json;
@@ -248,7 +248,7 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   assert.equal((await ask(bob)).status, 200);
   assert.equal((await objectsNamed(d.data, a.id)).length, 1, 'stored once');
 
-  // A merge of Bob's shows him the embeddings that it needed, though Ann's were there.
+  // Bob's merge shows him the embeddings that it needed, although Ann's existed.
   const third = (await upload(ann, other)).json;
   await end(ann, (await d.post('/v1/embeddings', { mesh: third.id }, ann)).json);
   await upload(bob, other);
@@ -269,7 +269,7 @@ test('deleting removes only the tenant that deletes from the owners', async (t) 
     Number(/"upload";r=(\d+)/.exec((await d.get('/v1/meshes', who)).headers.get('ratelimit'))[1]);
   const { id, url } = (await upload(ann, small)).json;
   await upload(bob, small);
-  // Several nodes hear of it in a moment, and answer by turns.
+  // Several nodes learn of it after a moment, and answer in turn.
   const leaves = async (...most) => {
     const all = async () => {
       const found = [];
@@ -280,7 +280,7 @@ test('deleting removes only the tenant that deletes from the owners', async (t) 
       await until(async () => (await all()).every((found) => isDeepStrictEqual(found, most)), `${most} are left`, 60);
     else assert.deepEqual(await all(), [most]);
   };
-  await leaves(other.length, other.length); // each has it, each pays for it
+  await leaves(other.length, other.length); // each owns it, so it counts for each
   const made = await Promise.all(
     [ann, bob].map(async (who) => (await end(who, (await d.post('/v1/embeddings', { mesh: id }, who)).json)).result),
   );
@@ -293,13 +293,13 @@ test('deleting removes only the tenant that deletes from the owners', async (t) 
     assert.equal((await d.get(thing, bob)).status, 200, 'the other has it still');
   }
   assert.equal((await d.get(`${url}/file`, bob)).bytes.length, small.length);
-  await leaves(small.length + other.length, other.length); // what is given up is free again
+  await leaves(small.length + other.length, other.length); // the bytes that a tenant gives up no longer count
   assert.equal((await upload(ann, small)).status, 201, 'and may come back');
   assert.equal((await upload(ann, other)).status, 201);
   assertProblem(await upload(ann, wave(3, 4)), 429, 'quota-exceeded');
   assert.equal((await d.delete(url, ann)).status, 204);
 
-  // The last owner takes it away, for all.
+  // When the last owner deletes it, it is gone for everyone.
   const files = async () => (await objectsNamed(d.data, id)).length;
   assert.equal(await files(), 1);
   assert.equal((await d.delete(url, bob)).status, 204);
@@ -307,7 +307,7 @@ test('deleting removes only the tenant that deletes from the owners', async (t) 
   assertProblem(await d.get(url, admin), 404, 'not-found');
   assert.equal((await d.get(made[1], bob)).status, 200, 'what was derived stays');
 
-  // Of several nodes each hears of a new quota by a notice.
+  // Each of several nodes learns of a new quota by a notice.
   const accepted = async (who) => {
     let reply = await upload(who, large);
     if (process.env.ORB_NODES)
@@ -315,7 +315,7 @@ test('deleting removes only the tenant that deletes from the owners', async (t) 
     return reply.json;
   };
 
-  // A job that needs it stands in the way, but only to the one whose job it is.
+  // A job that needs it prevents the deletion, but only for the job's own tenant.
   await upload(ann, large);
   await token('set', 'bob', '--quota', '0');
   const { url: big, id: mesh } = await accepted(bob);
@@ -327,7 +327,8 @@ test('deleting removes only the tenant that deletes from the owners', async (t) 
   assert.equal((await d.delete(big, ann)).status, 204);
   assert.equal((await d.delete(job.url, bob)).status, 200);
 
-  // The operator deletes for everybody, and sees what is nobody's. A token that comes back by its name finds its own.
+  // The operator deletes for everyone, and sees entries without an owner. A token that returns under its name finds its
+  // own entries.
   await upload(ann, small);
   await upload(bob, small);
   assert.equal((await d.delete(url, admin)).status, 204);

@@ -40,7 +40,7 @@ async function certificate(t) {
   return { home, key: at('key.pem'), file: at('cert.pem'), ca: await readFile(at('cert.pem')) };
 }
 
-/** Starts it; resolves to the line that it prints, or to its end. */
+/** Starts the daemon; resolves to the line that it prints, or to its end. */
 async function start(t, data, ...args) {
   const child = spawn(binaries.daemon, ['--listen', '127.0.0.1:0', '--data', data, ...args], {
     stdio: ['ignore', 'pipe', 'pipe'],
@@ -80,7 +80,7 @@ test('a morph over TLS', async (t) => {
   assert.equal(live.status, 200);
   await assert.rejects(send(d.url, '/livez'), { code: 'DEPTH_ZERO_SELF_SIGNED_CERT' });
 
-  // Up and down: several records of TLS, and a range.
+  // Upload and download: several records of TLS, and a range.
   const text = shapes.obj(shapes.egg(6));
   assert.ok(text.length > 1 << 20);
   const { status, bytes } = await send(d.url, '/v1/meshes', { ca, method: 'POST', body: text });
@@ -101,7 +101,7 @@ test('a morph over TLS', async (t) => {
   assert.equal(made.status, 200, made.bytes.toString());
   assert.equal(JSON.parse(made.bytes).certificate.valid, true);
 
-  // Plain HTTP gets nothing there, nor does TLS before 1.2; and neither harms it.
+  // Plain HTTP gets no answer there, and neither does TLS before 1.2; neither harms the daemon.
   await assert.rejects(
     new Promise((resolve, reject) =>
       http.get(d.url.replace('https', 'http'), { agent: false }, resolve).on('error', reject),
@@ -124,7 +124,7 @@ test('a morph over TLS', async (t) => {
     });
   for (const version of ['TLSv1.2', 'TLSv1.3']) await speaks(version);
   for (const version of ['TLSv1', 'TLSv1.1']) await assert.rejects(speaks(version), undefined, version);
-  // A request that cannot be read gets one answer, here too.
+  // A malformed request gets one answer, over TLS too.
   const raw = (request) =>
     new Promise((resolve, reject) => {
       let text = '';
@@ -168,7 +168,7 @@ test('SIGHUP reads a renewed certificate, and keeps the old one where the new on
   t.after(() => agent.destroy());
   assert.equal((await send(d.url, '/livez', { agent })).status, 200);
 
-  await writeFile(file, renewed.ca); // its key is not there yet
+  await writeFile(file, renewed.ca); // its key does not exist yet
   await hangUp(/the previous certificate stays in use/);
   assert.equal((await send(d.url, '/livez', { ca })).status, 200);
 

@@ -1,4 +1,4 @@
-// Tokens: the command that makes them, and what each scope may do.
+// Tokens: the command that creates them, and what each scope may do.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readFile, readdir } from 'node:fs/promises';
@@ -84,7 +84,7 @@ test('tokens allow what their scopes say', async (t) => {
   assert.ok([200, 202].includes((await d.post('/v1/embeddings', { mesh: id }, bearer(token['read,write']))).status));
   for (const open of ['/livez', '/readyz']) assert.equal((await d.get(open)).status, 200);
 
-  // The quota counts what is owned, each mesh once, also across a restart.
+  // The quota counts owned meshes, each once, also across a restart.
   assert.equal((await upload('small')).status, 201, 'what others have counts as well');
   assert.equal((await upload('small')).status, 200, 'its own is counted once');
   assertProblem(await upload('small', `${text}# 3\n`), 429, 'quota-exceeded');
@@ -107,7 +107,7 @@ test('tokens change while the daemon runs', async (t) => {
   await assert.rejects(run(d, 'add', 'web', '--scope', 'read'), { code: 1, stderr: /already/ });
   await assert.rejects(run(d, 'set', 'nobody', '--quota', '1'), { code: 1, stderr: /token "nobody" does not exist/ });
 
-  // Unfinished jobs are counted, ended ones are not.
+  // Unfinished jobs count; ended ones do not.
   const meshes = [];
   for (let i = 0; i < 3; i++)
     meshes.push(
@@ -133,8 +133,8 @@ test('tokens change while the daemon runs', async (t) => {
   await run(d, 'set', 'web', '--scope', 'read');
   assertProblem(await d.delete(again.json.url, bearer(web)), 403, 'forbidden');
 
-  // A stream and a poll that are open with a token end when it is taken back.
-  let ended = false; // by itself the job goes on for long, and the wait for a minute
+  // A stream and a poll that are open with a token end when it is revoked.
+  let ended = false; // without that, the job continues for a long time, and the wait for a minute
   const stream = d.get(`${again.json.url}/events`, bearer(web));
   const poll = d.get(again.json.url, { ...bearer(web), query: { wait: 60 } }).catch((error) => error);
   const timer = setTimeout(() => (ended = true), 45_000);
@@ -147,7 +147,7 @@ test('tokens change while the daemon runs', async (t) => {
   const admin = bearer(await add('root', '--scope', 'admin'));
   for (const job of [jobs[0], again.json]) await d.delete(job.url, admin);
 
-  // SIGHUP reads them again as well; and a stopped daemon is no hindrance.
+  // SIGHUP reads them again as well; the commands also work while no daemon runs.
   d.child.kill('SIGHUP');
   assert.equal((await d.get('/metrics', admin)).status, 200);
   await d.stop();

@@ -9,7 +9,7 @@ import * as shapes from './support/shapes.mjs';
 const CALLER = { trace: '4bf92f3577b34da6a3ce929d0e0e4736', span: '00f067aa0ba902b7' };
 const traceparent = (flags = '01') => ({ headers: { traceparent: `00-${CALLER.trace}-${CALLER.span}-${flags}` } });
 const upload = async (d) => (await d.upload(shapes.tetrahedron)).json;
-const CLOCK = 2; // ms: when a job became ready is told in whole ones
+const CLOCK = 2; // ms: the time at which a job became ready is in whole milliseconds
 
 async function count(d, result) {
   const text = (await d.get('/metrics')).bytes.toString();
@@ -71,7 +71,8 @@ test('a request is the parent of its jobs, and they of their stages', async (t) 
     assert.ok(job.end <= merge.start + CLOCK);
     assert.ok(stages(job).includes('embed'));
   }
-  // Each job was in the queue until a worker took it; that of the supermesh a second time, after its embeddings.
+  // Each job was in the queue until a worker took it; the job of the supermesh was there a second time, after its
+  // embeddings.
   for (const job of [merge, ...embeddings]) {
     const waits = c.named('queue', (span) => span['orbmorph.job'] === job['orbmorph.job']);
     assert.equal(waits.length, job === merge ? 2 : 1);
@@ -91,7 +92,7 @@ test('callers decide whether they are recorded; health checks never are', async 
   for (const quiet of ['/livez', '/readyz', '/metrics']) await d.get(quiet, traceparent());
   const silent = await d.post('/v1/embeddings', { mesh: mesh.id }, traceparent('00'));
   await d.ended(silent.json);
-  await d.get('/v1/nowhere', { headers: { traceparent: 'none' } }); // not well-formed: as without it
+  await d.get('/v1/nowhere', { headers: { traceparent: 'none' } }); // not well-formed: treated as missing
   await d.get(`/v1/embeddings/${'0'.repeat(64)}`);
   await until(() => c.named('GET /v1/embeddings/{id}').length === 1, 'the last one');
   const [missing] = c.named('GET /v1/embeddings/{id}');
@@ -123,13 +124,13 @@ test('without its collector the daemon serves, sends later what it kept, and end
   await until(async () => (await count(d, 'sent')) >= c.spans.length, 'they are counted');
   assert.equal(await count(d, 'dropped'), 0);
 
-  // What it refuses for good is dropped, and counted.
+  // Spans that the collector refuses permanently are dropped and counted.
   const strict = await Collector.start(t, (_, response) => response.writeHead(400).end());
   const other = await daemon(t, { args: ['--traces', strict.url] });
   await other.get('/v1/meshes');
   await until(async () => (await count(other, 'dropped')) > 0, 'a refused span is dropped');
 
-  // A collector that never answers keeps nobody waiting, at the end neither.
+  // A collector that never answers delays nobody, not even at the end.
   let asked = 0;
   const silent = await Collector.start(t, () => ++asked);
   const last = await daemon(t, { args: ['--traces', silent.url] });

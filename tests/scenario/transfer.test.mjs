@@ -1,4 +1,4 @@
-// "transfer": what the shapes have besides their surfaces, on the supermesh of every method.
+// "transfer": what the shapes have besides their surfaces, carried onto the supermesh of every method.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { rigged } from '../samples/rigged.mjs';

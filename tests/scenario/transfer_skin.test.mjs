@@ -12,10 +12,10 @@ const JOINTS = 20;
 const HEIGHT = 2;
 const asset = { fit: 'none', animation: 'none' };
 
-/** Which joint a height of the sample belongs to, as its weights say. */
+/** The joint to which a height of the sample belongs, by its weights. */
 const jointAt = (y) => Math.min(JOINTS - 1.001, Math.max(0, (y / HEIGHT) * (JOINTS - 1)));
 
-/** What the sample's target "smile" does. */
+/** The offset of the sample's target "smile". */
 const smile = ([, y]) => [0, y > 1.4 ? 0.05 * (y - 1.4) : 0, 0];
 
 const times = (a, b) =>
@@ -26,7 +26,7 @@ const one = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 const local = ({ matrix, translation: [x, y, z] = [0, 0, 0] }) => matrix ?? [...one.slice(0, 12), x, y, z, 1];
 const apply = (m, [x, y, z]) => [0, 1, 2].map((r) => m[r] * x + m[4 + r] * y + m[8 + r] * z + m[12 + r]);
 
-/** The place of each vertex of a primitive as its skin shows it, with some joints translated in their own frame. */
+/** The place of each vertex of a primitive as deformed by its skin, with some joints translated in their own frame. */
 function posed({ gltf, read }, { POSITION, JOINTS_0, WEIGHTS_0 }, moved = {}) {
   const [skin] = gltf.skins;
   const parent = new Map(gltf.nodes.flatMap(({ children = [] }, n) => children.map((c) => [c, n])));
@@ -55,7 +55,7 @@ function rests({ gltf }) {
   return gltf.skins[0].joints.map((n) => world(n).slice(12, 15));
 }
 
-/** The weights at the places that `at` gives: those of the sample, blended on its triangles. */
+/** The weights at the places that `at` gives: the sample's weights, blended on its triangles. */
 function assertWeights({ JOINTS_0, WEIGHTS_0 }, at) {
   for (const [v, [, y]] of at.entries()) {
     const joints = JOINTS_0.slice(4 * v, 4 * v + 4);
@@ -172,7 +172,7 @@ test('the joints and their animations follow the base', async (t) => {
   const result = await assetOf(d, made);
   const [part] = result.all;
   posed(result, part).forEach((p, v) => near(p, part.POSITION.slice(3 * v, 3 * v + 3), 1e-4, 'at rest'));
-  // The joints are as near to their places as the points of the map are.
+  // The joints are as near to their places as the points of the map are to theirs.
   const slip = shown(part).map(([x, y, z], v) =>
     Math.hypot(...[3 * x + 5, 3 * y - 1, 3 * z].map((c, k) => c - part.POSITION[3 * v + k])),
   );
@@ -247,7 +247,7 @@ test('targets of equal names get a number', async (t) => {
   const kept = [shape(body, 'body'), shape(body, 'other')];
   assert.deepEqual(await named(kept, { method: 'template' }, [1]), ['smile', 'other', 'smile (2)']);
 
-  // Names are cut between characters, and what the report calls a target is its name in the asset.
+  // Names are cut between characters, and the report names a target as the asset does.
   for (const [name, cut] of [
     ['x'.repeat(127), 'x'.repeat(127)],
     ['é'.repeat(80), 'é'.repeat(63)],

@@ -32,7 +32,7 @@ function unwrapped() {
   });
 }
 
-/** The picture of a material, and its colour at texture coordinates, as viewers blend it. */
+/** The picture of a material, and its colour at texture coordinates, blended as viewers do. */
 function pictureOf(bytes, gltf, material) {
   const { index } = gltf.materials[material].pbrMetallicRoughness.baseColorTexture;
   const { bufferView, mimeType } = gltf.images[gltf.textures[index].source];
@@ -60,7 +60,7 @@ function pictureOf(bytes, gltf, material) {
 const chosen = (primitive, variant) =>
   primitive.extensions.KHR_materials_variants.mappings.find(({ variants }) => variants.includes(variant)).material;
 
-/** That the picture shows the bean's colours at the corners and at the middles of all triangles of the part. */
+/** Asserts that the picture shows the bean's colours at the corners and at the middles of all triangles of the part. */
 function assertBaked(part, picture, most, what) {
   const places = shown(part);
   for (let i = 0; i < part.indices.length; i += 3) {

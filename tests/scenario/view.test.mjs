@@ -77,7 +77,7 @@ test('textures repeat or clamp as their sampler says, and are averaged when mini
   assert.equal(mainly(at(repeat, 0.32, 0.12)), 'r', 'the first quarter repeats');
   const clamp = await draw(t, square({ uv: twice, image: quarters, wrap: 33071 }), '--poses', '2', '--size', '64');
   assert.equal(mainly(at(clamp, 0.38, 0.12)), 'g', 'the edge continues');
-  // Half a turn and a shift by (1,1): the opposite quarter. Half a width more, against that turn: its neighbour.
+  // A half turn and a shift by (1,1): the opposite quarter. Half a width more, against that rotation: its neighbour.
   for (const [offset, expected] of [
     [[1, 1], 'b'],
     [[0.5, 1], 'gray'],
@@ -172,7 +172,7 @@ function still({ positions, triangles }, turn = (p) => p) {
     moves: points.map(() => [0, 0, 0]),
   });
 }
-/** How many pixels of the left half are not background, and how wide and high they reach. */
+/** How many pixels of the left half are not background, and the width and height of their extent. */
 function outline(png) {
   const rows = [];
   const columns = [];
@@ -194,7 +194,7 @@ async function drawAsIs(t, glb, ...options) {
 }
 
 test('view looks at the largest side, whichever way a shape faces', async (t) => {
-  // three times as long as wide
+  // three times as long as it is wide
   const long = ball(4, ([x, y, z]) => [x, y, 3 * z]);
   for (const angle of [0, 37, 90, 200]) {
     const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];

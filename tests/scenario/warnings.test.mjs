@@ -1,4 +1,4 @@
-// A supermesh warns where its map is bad, and says where; so do the client and its report.
+// A supermesh warns where its map is bad, and says where; the client and its report do the same.
 import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -14,7 +14,7 @@ const corners = [
   [-1, 1, -1],
   [-1, -1, 1],
 ];
-// The corners of a tetrahedron, and the same four drawn together to a tenth around the first.
+// The corners of a tetrahedron, and the same four scaled to a tenth around the first.
 const near = corners.map((p) => p.map((x, k) => corners[0][k] + 0.05 * (x - corners[0][k])));
 const landmarks = (to) => corners.map((p, i) => ({ name: `corner ${i}`, at: [{ point: p }, { point: to[i] }] }));
 const unit = (p) => p.map((x) => x / Math.hypot(...p));
@@ -32,13 +32,13 @@ test('a map that draws a surface together is warned of, with the place', async (
   assert.equal(done.code, 0, done.err);
   const [{ url }] = (await d.get('/v1/supermeshes')).json.supermeshes;
   const made = (await d.get(url)).json;
-  // What the report says without the warning: the 99th percentile by area is above 20.
+  // The figures of the report without the warning: the 99th percentile by area is above 20.
   assert.ok(made.pairs[0].distortion.symmetric_dirichlet.p99 > 20);
   const [warning] = made.warnings;
   assert.deepEqual([warning.kind, warning.a, warning.b], ['stretched', 0, 1]);
   assert.ok(warning.share > 0.01 && warning.share <= 1);
   assert.ok(warning.parts.length >= 1 && warning.parts.length <= 4);
-  // The triangles are in the asset, and within the balls.
+  // The triangles are in the asset, inside the balls.
   const { shapes, count } = morphOf((await d.get(made.asset)).bytes);
   assert.ok(count > 0 && shapes.length === 2);
   for (const part of warning.parts) {

@@ -1,5 +1,5 @@
-// Webhooks by Standard Webhooks: what a receiver gets, its signatures by the package standardwebhooks, retries, and that
-// kill -9 loses no message. ORB_HOOK_KILLS is the number of kills.
+// Webhooks by Standard Webhooks: what a receiver gets, its signatures checked by the package standardwebhooks, retries,
+// and no message lost by kill -9. ORB_HOOK_KILLS is the number of kills.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -82,11 +82,11 @@ test('the end of a job is announced to the webhook that the request names', asyn
       finished: 0,
     },
   );
-  // The webhook is not part of the id: the same request finds the embedding, and there is no job that would end.
+  // The webhook is not part of the id: the same request finds the embedding, and no job exists that would end.
   const known = await embed(d, { mesh: id, webhook: { url: `${url}/hook` } });
   assert.equal(known.status, 200);
   assert.equal(known.json.url, job.result);
-  // Again, by hand.
+  // A retry by hand.
   const again = await d.post(`${job.url}/deliveries/1/retry`);
   assert.equal(again.status, 202, again.bytes.toString());
   assert.equal(again.json.state, 'pending');
@@ -159,7 +159,7 @@ test('a webhook is read strictly, and goes to public and listed addresses only',
     [{ url: 'http://8.8.8.8/' }, 'forbidden-address', 403],
   ])
     assertProblem(await embed(d, { mesh: id, webhook }), status, type, JSON.stringify(webhook));
-  // What a name leads to is looked at when the message is sent. A redirect is not followed.
+  // The daemon resolves a name when it sends the message. It does not follow a redirect.
   const listed = await origin(t, (_, response) => response.writeHead(307, { location: url }).end(), '127.0.0.2');
   await add(d, 'local', '--url', `http://localhost:${port}/`);
   const job = await d.ended((await embed(d, { mesh: id, webhook: { url: listed.url } })).json);
@@ -272,7 +272,7 @@ test('a receiver that fails is asked again and delays no other', async (t) => {
   for (let i = 0; i < 3; i++) await d.made('/v1/embeddings', { mesh: await mesh(d) });
   await until(() => fine.requests.length === 4, 'the other messages');
   silent.requests.slice(1).forEach((r, i) => assert.ok(r.at - silent.requests[i].at > 14_000, 'one after another'));
-  // By hand, before it is due.
+  // A retry by hand before it is due.
   well = true;
   await d.post(`${job.url}/deliveries/${state.ill.number}/retry`);
   await until(async () => (await deliveries(d, job)).find((x) => x.webhook === 'ill').state === 'delivered', 'its end');
@@ -332,7 +332,7 @@ test(`${kills} kills -9 lose no message`, async (t) => {
     if (behaviour === 0) response.writeHead(503).end();
     else if (behaviour === 1) request.socket.destroy();
     else {
-      const message = verified(secret, { body, headers: request.headers }); // now: later it is too old
+      const message = verified(secret, { body, headers: request.headers }); // now: the signature is too old later
       got.set(message.data.id, [...(got.get(message.data.id) ?? []), { body, headers: request.headers }]);
       setTimeout(() => response.writeHead(204).end(), behaviour === 2 ? 30 : 0);
     }

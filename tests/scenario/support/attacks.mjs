@@ -1,4 +1,4 @@
-// Files that are made to cost much: small, and dear to a reader without bounds (docs/limits.md).
+// Files that are made to cost much: small, but expensive for a reader without bounds (docs/limits.md).
 
 const MASK = (1n << 64n) - 1n;
 /** The inverse of an odd number modulo 2^64. */
@@ -124,7 +124,7 @@ export function sharedIndices(indices = 2 << 20, primitives = 2000) {
   );
 }
 
-/** OBJ with one polygon: a star, run around over and over. */
+/** OBJ with one polygon: a star that runs around many times. */
 export function hugePolygon(corners = 5_000_000) {
   const star = 'v 3 0 0\nv 1 1 0\nv 0 3 0\nv -1 1 0\nv -3 0 0\nv -1 -1 0\nv 0 -3 0\nv 1 -1 0\nf';
   return Buffer.from(`${star}${' 1 2 3 4 5 6 7 8'.repeat(corners / 8)}\n`);

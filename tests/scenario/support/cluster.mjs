@@ -6,7 +6,7 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import { Daemon, patience, until } from './daemon.mjs';
 
-const program = process.env.ORB_DAEMON; // that starts with a catalogue and objects of its own
+const program = process.env.ORB_DAEMON; // starts a daemon with its own catalogue and objects
 assert.ok(
   program && process.env.ORB_POSTGRESQL && process.env.ORB_S3,
   'to be run by with_postgresql.sh and with_s3.sh',
@@ -23,7 +23,7 @@ export class Cluster {
     const name = `cluster${process.pid}-${++Cluster.count}`;
     this.catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
     this.bucket = `s3://objects/${name}?endpoint=${process.env.ORB_S3}`;
-    this.objects = this.bucket; // as nodes reach it
+    this.objects = this.bucket; // the address for nodes
     t.after(() => this.end());
   }
 
@@ -75,7 +75,7 @@ export class Cluster {
     );
   }
 
-  /** Every row has its object, and every object its row, but for what a node that died had just uploaded. */
+  /** Every row has its object, and every object its row, except for the latest uploads of a node that died. */
   async check() {
     const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
     const args = ['--check-data', '--data', data, '--catalogue', this.catalogue, '--objects', this.bucket];

@@ -1,4 +1,4 @@
-// A collector of OpenTelemetry: takes spans as the daemon sends them, OTLP over HTTP in its JSON form.
+// A collector of OpenTelemetry: receives spans from the daemon, OTLP over HTTP in its JSON form.
 import assert from 'node:assert/strict';
 import { createServer } from 'node:http';
 
@@ -20,7 +20,7 @@ function read(span, resource) {
     name: span.name,
     kind: span.kind,
     error: span.status?.code === 2 ? span.status.message : undefined,
-    // A double has a quarter of a microsecond here.
+    // A double resolves a quarter of a microsecond here.
     start: Number(span.startTimeUnixNano) / 1e6,
     end: Number(span.endTimeUnixNano) / 1e6,
     resource,
@@ -32,7 +32,7 @@ export class Collector {
   spans = [];
   batches = 0;
 
-  /** answer: given (request, response), answers in another way; false: as usual. */
+  /** answer(request, response): answers differently; returns false for the usual answer. */
   static async start(t, answer = () => false, port = 0) {
     const made = new Collector();
     made.server = createServer(async (request, response) => {

@@ -130,7 +130,7 @@ export class Daemon {
     }
   }
 
-  /** Waits until a new token is known to each of several nodes, which answer by turns and hear of it by a notice. */
+  /** Waits until each of several nodes knows a new token. They answer in turn and learn of it by a notice. */
   async known(options) {
     let known = 0;
     await until(async () => {
@@ -143,7 +143,8 @@ export class Daemon {
   async request(method, target, { body, headers, query, signal } = {}) {
     const url = new URL(target, this.url);
     for (const [name, value] of Object.entries(query ?? {})) url.searchParams.set(name, value);
-    // A test that computed for long has not yet seen that the daemon closed an idle connection: let fetch() see it.
+    // A test that computed for a long time has not yet seen that the daemon closed an idle connection: lets fetch() see
+    // it.
     for (let turn = 0; turn < 2; turn++) await new Promise(setImmediate);
     const isJson = body !== undefined && !(body instanceof Uint8Array) && typeof body !== 'string';
     const { response, bytes } = await this.ask(url, {
@@ -217,7 +218,10 @@ export class Daemon {
   }
 }
 
-/** Starts a daemon that stops, and whose data is deleted, when the test ends. program: what starts it, with arguments. */
+/**
+ * Starts a daemon; when the test ends, it is stopped and its data is deleted. program: the command that starts it, with
+ * arguments.
+ */
 export async function daemon(t, { args = [], env = {}, program } = {}) {
   const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
   const made = Object.assign(new Daemon(data, args, env), { program });

@@ -22,7 +22,7 @@ export async function shellLines(file) {
   return blocks(text, 'sh').join('\n').replaceAll('curl -sS', 'curl -sS --fail-with-body');
 }
 
-/** A box with a texture: "any GLB with a texture" of the cookbook. */
+/** A box with a texture, for "any GLB with a texture" of the cookbook. */
 function texturedBox() {
   const positions = [];
   const uv = [];

@@ -1,4 +1,4 @@
-// Draco-compressed glTF, by Google's encoder and decoder as three has them.
+// Draco-compressed glTF, by Google's encoder and decoder in the form that three has.
 import { readFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import path from 'node:path';
@@ -18,7 +18,7 @@ async function load(file) {
 }
 
 /**
- * A GLB of one primitive that Draco has compressed, with Google's encoder. colors: four bytes a vertex. sets: attributes by
+ * A GLB of one primitive compressed with Google's Draco encoder. colors: four bytes per vertex. sets: attributes by
  * name, {rows, componentType, normalized} with floats, bytes or 16-bit numbers. method: of the encoder. edit(json)
  * changes the document.
  */
@@ -107,7 +107,7 @@ export async function draco({ positions, triangles, colors, sets = {}, method = 
   };
 }
 
-/** The positions that a decoder reads, 3 a vertex, and the triangles. */
+/** The positions that a decoder reads, 3 per vertex, and the triangles. */
 export async function undraco(bytes, id) {
   const { module } = await load(path.join(folder, 'draco_decoder.js'));
   const decoder = new module.Decoder();

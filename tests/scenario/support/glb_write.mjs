@@ -1,7 +1,7 @@
 // A writer of binary glTF, against the specification: one mesh, one primitive, at most one morph target and one texture.
 
 /**
- * positions, normals, colors, moves: [x,y,z] a vertex; uv, uv1: [u,v]; triangles; image: a PNG; factor: base colour.
+ * positions, normals, colors, moves: [x,y,z] per vertex; uv, uv1: [u,v]; triangles; image: a PNG; factor: base colour.
  * edit(gltf, push): changes the document before it is written; push(bytes) adds a buffer view and returns its number.
  */
 export function writeGlb({ positions, normals, colors, uv, uv1, triangles, moves, image, factor, wrap = 10497, edit }) {

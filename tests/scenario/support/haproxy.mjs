@@ -9,7 +9,10 @@ import { configuration, haproxyProgram } from './haproxy_config.mjs';
 
 export const lacksHaproxy = haproxyProgram ? false : 'haproxy is not there';
 
-/** Starts haproxy before nodes with these URLs, until the test ends; resolves to what asks it as one asks a daemon. */
+/**
+ * Starts haproxy in front of nodes with these URLs, until the test ends; resolves to an object with the requests of a
+ * daemon.
+ */
 export async function haproxy(t, urls) {
   const folder = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
   const file = path.join(folder, 'haproxy.cfg');

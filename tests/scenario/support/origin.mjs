@@ -1,10 +1,10 @@
-// An HTTP server of the test that webhooks go to, or that meshes come from.
+// An HTTP server of the test that receives webhooks, or serves meshes.
 import { createServer } from 'node:http';
 import { createServer as createSecure } from 'node:https';
 
 /**
- * Listens on `address`, with `tls` ({key, cert}) by https; `answer(request, response, body)` answers. Resolves to {url, requests, close()}; `requests` are
- * {method, url, headers, body, at} in the order of their arrival.
+ * Listens on `address`, with `tls` ({key, cert}) by https; `answer(request, response, body)` answers. Resolves to {url,
+ * requests, close()}; `requests` are {method, url, headers, body, at} in the order of their arrival.
  */
 export async function origin(t, answer = (_, response) => response.end(), address = '127.0.0.1', tls) {
   const requests = [];

@@ -74,7 +74,7 @@ function unfilter(packed, width, height, channels) {
   return out;
 }
 
-/** {width, height, frames: [RGB bytes…], milliseconds}; a picture that stands still is one frame. */
+/** {width, height, frames: [RGB bytes…], milliseconds}; a still picture has one frame. */
 export function readPng(bytes) {
   let width;
   let height;

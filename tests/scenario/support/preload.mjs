@@ -5,7 +5,10 @@ import path from 'node:path';
 
 const separator = /[\s:]/; // between the entries of LD_PRELOAD; it has no quoting
 
-/** The value of LD_PRELOAD for these files, and what removes the links made for it: a path with a blank gets a link. */
+/**
+ * The value of LD_PRELOAD for these files, and a function that removes the links made for it: a path with a blank gets
+ * a link.
+ */
 export function preload(files) {
   const base = [tmpdir(), '/tmp', '/dev/shm'].find((folder) => !separator.test(folder) && existsSync(folder));
   const folder = mkdtempSync(path.join(base, 'orbmorph-preload-'));

@@ -1,4 +1,4 @@
-// The processes of a daemon: what they use, read from /proc.
+// The processes of a daemon and the resources they use, read from /proc.
 import { readdirSync, readFileSync } from 'node:fs';
 
 /** The processes whose parent is `pid`. */
@@ -19,7 +19,7 @@ export function children(pid) {
 /** The processes that check meshes and run jobs. */
 export const workers = (d) => children(d.child.pid).flatMap(children);
 
-/** Resident megabytes of the daemon and all its processes; what several share counts once. */
+/** Resident megabytes of the daemon and all its processes; shared memory counts once. */
 export function megabytes(d) {
   let kilobytes = 0;
   const forks = children(d.child.pid);

@@ -1,11 +1,11 @@
-// A proxy before an S3 server that answers some requests as a server in trouble does.
+// A proxy in front of an S3 server that answers some requests like a failing server.
 import http from 'node:http';
 
-/** The next request is sent on. */
+/** Forwards the next request. */
 export const pass = 'pass';
 /** 503 SlowDown, without asking the server. */
 export const busy = 'busy';
-/** The server does what is asked, and its answer is lost. */
+/** The server carries out the request, and its answer is lost. */
 export const lost = 'lost';
 /** The same, and its answer is 500. */
 export const late = 'late';
@@ -33,8 +33,9 @@ function answer(how, from, body, response) {
 }
 
 /**
- * Starts it before the server at `url`, until the test ends. `decide` chooses by {method, path, query, tries}, where tries
- * counts the requests of this method to this path and query, from 1. It may return a promise, which holds the request.
+ * Starts it in front of the server at `url`, until the test ends. `decide` chooses by {method, path, query, tries},
+ * where tries counts the requests of this method to this path and query, from 1. It may return a promise, which holds
+ * the request.
  */
 export async function s3Proxy(t, url, decide) {
   const proxy = { decide, seen: [], tries: new Map() };
@@ -45,7 +46,7 @@ export async function s3Proxy(t, url, decide) {
     const asked = { method: request.method, path, query, tries: proxy.tries.get(key) };
     const how = (await proxy.decide(asked)) ?? pass;
     proxy.seen.push({ ...asked, how });
-    if (response.destroyed) return; // who asked has gone while the request was held
+    if (response.destroyed) return; // the client has gone while the request was held
     if (how === busy) {
       request.resume();
       request.on('end', () =>
@@ -54,11 +55,12 @@ export async function s3Proxy(t, url, decide) {
       return;
     }
     const { hostname, port } = new URL(url);
-    // The headers as they came: the signature is over them.
+    // The headers unchanged: the signature covers them.
     const { method, url: target, headers } = request;
     const to = http.request({ hostname, port, method, path: target, headers, agent: false });
     request.pipe(to);
-    // Swift sends a body with the answer to HEAD of a key that it lacks. To Node that is an error of the connection.
+    // Swift sends a body with the answer to HEAD of a key that it lacks. Node reports that as an error of the
+    // connection.
     let headed = false;
     to.on('error', () => headed || response.destroy());
     to.on('response', async (from) => {

@@ -86,7 +86,7 @@ export function apart(a, b, shift = 10) {
   };
 }
 
-/** The sum that ends each file of a ZIP archive, as PNG and Ethernet have it. */
+/** The checksum at the end of each file of a ZIP archive, the same as in PNG and Ethernet. */
 function crc32(bytes) {
   let sum = -1;
   for (const byte of bytes) {
@@ -146,7 +146,7 @@ export const package3mf = (xml) =>
 
 export const threeMf = (...args) => package3mf(xmlOf3mf(...args));
 
-/** Every triangle with vertices of its own, as in an STL file. */
+/** Every triangle has its own vertices, as in an STL file. */
 export function soup({ positions, triangles }) {
   return {
     positions: triangles.flatMap((t) => t.map((v) => positions[v])),
@@ -261,8 +261,8 @@ export function grating(nx, ny, map = (p) => p) {
 }
 
 /**
- * A figure with head, arms, legs and belly, the same on its left (−x) and right. lengths: of an arm, a leg, the head and the
- * belly; depth: of the whole from front to back.
+ * A figure with head, arms, legs and belly, symmetric between its left (−x) and right. lengths: of an arm, a leg, the
+ * head and the belly; depth: of the whole from front to back.
  */
 export function figure([arm, leg, head, belly], depth = 0.6, levels = 4) {
   const bump = (p, d, width) => {

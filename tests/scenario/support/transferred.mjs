@@ -1,4 +1,4 @@
-// Shapes with texture coordinates, and an asset with what "transfer" gave it.
+// Shapes with texture coordinates, and an asset with the results of "transfer".
 import assert from 'node:assert/strict';
 import validator from 'gltf-validator';
 import { parseGlb } from './glb.mjs';
@@ -9,7 +9,10 @@ export const uploaded = async (d, bytes, query) => {
   return { mesh: reply.json.id };
 };
 
-/** A shape as two charts, which meet where its sphere has x = 0. uvOf(v, east): of vertex v of the shape on a chart. */
+/**
+ * A shape as two charts, which meet where its sphere has x = 0. uvOf(v, east): the coordinates of vertex v of the shape
+ * on a chart.
+ */
 export function inCharts({ positions, points, triangles }, uvOf) {
   const made = { positions: [], uv: [], triangles: [] };
   const known = new Map();
@@ -29,7 +32,7 @@ export function inCharts({ positions, points, triangles }, uvOf) {
   return made;
 }
 
-/** The asset of a supermesh: its document, and each primitive with its values read. Fails where the validator warns. */
+/** The asset of a supermesh: its document, and each primitive with its values read. Fails if the validator warns. */
 export async function assetOf(d, made) {
   const { bytes } = await d.get(made.asset);
   const { issues } = await validator.validateBytes(new Uint8Array(bytes));
