@@ -50,7 +50,7 @@ if [ "$serve" = yes ]; then
   orb_install_node
 fi
 
-# Where results stay: a folder without blanks in its name.
+# The folder of the results, without blanks in its name.
 pick_output() {
   local folder
   for folder in "$root/build/demo" "${HOME:-/}/orbmorph-demo" /var/tmp/orbmorph-demo; do
@@ -76,7 +76,7 @@ build() {
   [ -f "$root/build/build.ninja" ] || cmake -S "$root" --preset release -DORB_TESTS=OFF
   cmake --build "$root/build" --target orbmorphd orbmorph
 }
-# What the build does, every five seconds: Ninja writes [done/all] before each step, build.sh "stage: …".
+# Prints the step of the build every five seconds: Ninja writes [done/all] before each step, build.sh "stage: …".
 say_progress() {
   local step
   while sleep 5; do
@@ -125,7 +125,7 @@ start_daemon() {
   done
   return 1
 }
-# the port of all examples, or any where another program has it
+# the port of all examples, or any port if another program has it
 start_daemon 8080 || start_daemon 0 || true
 if [ -z "$address" ]; then
   cat "$data/log" >&2
@@ -133,7 +133,7 @@ if [ -z "$address" ]; then
   exit 1
 fi
 
-# a.obj b.off → a-b; what may stand in a file's name without quoting
+# a.obj b.off → a-b; the characters that a file's name may have without quoting
 stem=
 for mesh in "${meshes[@]}"; do
   name=$(basename -- "$mesh")

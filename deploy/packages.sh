@@ -14,10 +14,10 @@ orb_long_packages=(
   pgbouncer valgrind wrk blender python3-numpy caddy debootstrap lintian buildah podman runc prometheus systemd
 )
 
-# For tests/long.sh cluster on a second S3 server, where there are such packages.
+# For tests/long.sh cluster on a second S3 server, if these packages exist.
 orb_radosgw_packages=(radosgw ceph-osd ceph-mon)
 
-# Installs those of its arguments that are missing, as root or through sudo; never asks.
+# Installs those of its arguments that are missing, as root or through sudo; never prompts.
 orb_install_packages() {
   local package missing=() as_root=()
   for package in "$@"; do
@@ -39,7 +39,7 @@ orb_install_packages() {
     install "${missing[@]}" </dev/null >/dev/null
 }
 
-# Node and npm, from wherever they are there already.
+# Installs Node and npm unless both exist, wherever they come from.
 orb_install_node() {
   if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
     orb_install_packages nodejs npm

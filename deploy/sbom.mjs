@@ -16,7 +16,7 @@ const headers = ['libeigen3-dev', 'libspectra-dev'];
 
 const run = (program, ...args) =>
   execFileSync(program, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] });
-/** What it prints, also where it fails: dpkg-query does if one of its arguments is unknown. */
+/** Its output, even if it fails: dpkg-query does if one of its arguments is unknown. */
 const tryRun = (...args) => {
   try {
     return run(...args);
@@ -100,7 +100,7 @@ function npm(name, { version, resolved, integrity, license }) {
 }
 
 const direct = new Set(); // names of libraries that the programs themselves name
-const libraries = new Map(); // all that the loader brings: name → file
+const libraries = new Map(); // all libraries that the loader loads: name → file
 for (const program of programs) {
   for (const [, name] of run('readelf', '--dynamic', '--wide', program).matchAll(/\(NEEDED\).*\[(.+)\]/g))
     direct.add(name);

@@ -30,7 +30,7 @@ static void *embed(void *argument) {
   return NULL;
 }
 
-/* Embeds and cancels after `wait` seconds. The delays are in seconds, 0 where the embedding had already finished. */
+/* Embeds and cancels after `wait` seconds. The delays are in seconds, 0 if the embedding had already finished. */
 static int cancel_at(const orb_mesh *mesh, const orb_embed_options *options, int threads, double wait, double *delay,
                      double *cpu) {
   run r = {.ctx = bench_open(threads, ORB_CPU_AUTO), .mesh = mesh, .options = options};

@@ -1,4 +1,4 @@
-/* How long nodes take to claim a job, where a million wait in PostgreSQL (docs/cluster.md, "Capacity").
+/* Measures how long nodes take to claim a job while a million wait in PostgreSQL (docs/cluster.md, "Capacity").
  *
  *   tests/tools/with_postgresql.sh build/bin/claims-bench [JOBS [OWNERS [CLAIMS]]]    (1000000 100 1000)
  *
@@ -86,7 +86,7 @@ static void end(catalogue *cat, const job_claim *c) {
   must(catalogue_job_finish(cat, c->row.id, c->row.attempt, &how) == STORE_OK, "a job cannot be ended");
 }
 
-/* Claims of one kind of worker; expects: whether there are jobs for it. */
+/* Claims of one kind of worker; expects: whether jobs for it exist. */
 static double measure_claims(catalogue *cat, const char *what, const claim_wish *wish, int count, int expects) {
   series s = {.what = what, .ms = calloc((size_t)count, sizeof(double))};
   must(s.ms != NULL, "out of memory");

@@ -340,7 +340,7 @@ static int write_halfway(const truth_run *run, const char *key, orb_fit fit, api
   return fine;
 }
 
-/* The mean of the confidences of the found landmarks; null where none were searched. */
+/* The mean of the confidences of the found landmarks; null if the search did not run. */
 static void write_confidence(const orb_alignment *alignment, api_text *line) {
   double sum = 0;
   for (int32_t i = 0; i < alignment->found_count; i++) {
@@ -354,7 +354,7 @@ static void write_confidence(const orb_alignment *alignment, api_text *line) {
   }
 }
 
-/* What the match of the shapes is judged by; null where none was searched. */
+/* The figures by which the match of the shapes is judged; null if the search did not run. */
 static void write_match(const orb_alignment *alignment, api_text *line) {
   api_json_key(line, "match");
   if (!alignment->match.is_measured) {

@@ -1,4 +1,4 @@
-// Compares two daemons, in turns, so that other load of the machine meets both alike.
+// Compares two daemons alternately, so that other load of the machine affects both alike.
 //
 //   node tests/bench/beside.mjs OLD NEW [ROUNDS [PART OF A NAME…]]
 //
@@ -16,7 +16,7 @@ const [old, fresh, count = '5', ...some] = process.argv.slice(2);
 const scratch = mkdtempSync(path.join(os.tmpdir(), 'orbmorph-beside-'));
 const median = (list) => list.toSorted((a, b) => a - b)[Math.floor(list.length / 2)];
 
-/** Processor time in ms of a process, its threads, and its descendants, those that have ended included. */
+/** Processor time in ms of a process, its threads, and its descendants, including those that have ended. */
 function processorMs(pid) {
   const rows = new Map();
   for (const name of readdirSync('/proc').filter((n) => /^\d+$/.test(n)))
@@ -55,7 +55,7 @@ function ball(n) {
       }
   return shapes.binaryPly({ positions, triangles });
 }
-/** Sends meshes, one after another. They are made before, so that the time is the daemon's. */
+/** Sends meshes, one after another. They are generated beforehand, so that the time is the daemon's. */
 const uploads = (n, times) => ({
   prepare: () => Array.from({ length: times }, () => ball(n)),
   run: async (d, _, bodies) => {
@@ -92,8 +92,8 @@ async function start(program, name) {
   await d.start();
   const ids = [];
   for (const shape of [shapes.egg(4), shapes.bean(4)]) ids.push((await d.upload(shapes.obj(shape))).json.id);
-  // 8bbd71c makes the folders of objects at its start, later versions each with its first object: now, so that it is over
-  // before anything is measured.
+  // 8bbd71c creates the folders of objects at its start, later versions create each with its first object: create them
+  // now, before the measurement begins.
   const objects = path.join(scratch, name, 'objects');
   for (const kind of readdirSync(objects))
     for (let i = 0; i < 256; i++)

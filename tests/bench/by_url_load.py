@@ -33,7 +33,7 @@ SAMPLES = ROOT / "tests/samples"
 CONNECTIONS = 64
 RATIO_LEAST = 0.9
 P99_MOST_MS = 5.0
-VISITS = 4000  # of the rows with one visitor after the other
+VISITS = 4000  # of the rows with one visitor at a time
 CROWD_PAUSE_S = 0.1  # of each of the visitors at once
 CROWD_S = 6
 OTHERS = {"small.glb": "&tolerance=0.003", "large.glb": "&remesh=overlay&normals=false"}

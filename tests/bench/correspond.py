@@ -39,7 +39,7 @@ from first_answer import ROOT, build_base
 from surface import Surface, cross, dot, minus
 
 RIGHT = 10
-FORMAT = 2  # of the files of the store: a change measures all again
+FORMAT = 2  # the version of the files in the store: after a change everything is measured
 CURVE = (1, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50)
 PAIR_COLUMNS = ["set", "pair", "kind", "half", "version", "given", "mean", "median", "95 %", "right", "% diagonal",
                 "energy", "confidence", "thin %", "CPU s"]

@@ -1,4 +1,5 @@
-// Throughput of small jobs with 1, 2 and 4 nodes that work, and what a job costs the database: the figures of docs/cluster.md.
+// Throughput of small jobs with 1, 2 and 4 working nodes, and the cost of a job for the database: the figures of
+// docs/cluster.md.
 //
 //   ORB_POSTGRESQL_OPTIONS='-c shared_preload_libraries=pg_stat_statements' \
 //     tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/bench/scaling.mjs
@@ -31,7 +32,7 @@ const GOALS = new Map([
   [4, 3.4],
 ]);
 
-/** A node and all below it: the processes of its jobs, whose time they give to their parent when they end. */
+/** A node and its descendants: the processes of its jobs, whose time is added to their parent when they end. */
 function members(root) {
   const below = new Map();
   for (const pid of readdirSync('/proc').filter((name) => /^\d+$/.test(name))) {
@@ -45,7 +46,7 @@ function members(root) {
   return all;
 }
 
-/** A cgroup that holds what is in it to the share: its file of processes, and a function that removes it. */
+/** A cgroup that limits its processes to the share: its file of processes, and a function that removes it. */
 function held(name) {
   const first = existsSync('/sys/fs/cgroup/cgroup.controllers');
   const group = path.join(first ? '/sys/fs/cgroup' : '/sys/fs/cgroup/cpu', name);
@@ -79,7 +80,7 @@ function sql(catalogue, text) {
   }).trim();
 }
 
-/** What the server has done so far: statements but those of this program, transactions, rows, bytes of WAL. */
+/** The work of the server so far: statements except for those of this program, transactions, rows, bytes of WAL. */
 function cost(catalogue) {
   const text = sql(
     catalogue,
@@ -130,7 +131,7 @@ async function measure(count) {
     }
     const roots = works.map(({ child }) => child.pid);
     const had = roots.map(cpu);
-    // The database says when the last job ended: asking it more often would take time from the nodes.
+    // The database knows when the last job ended: asking it more often would take time from the nodes.
     const ended = () => sql(catalogue, 'SELECT count(*), max(finished) FROM job WHERE state=2 /* bench */').split('|');
     const began = Date.now();
     const first = Number(ended()[0]);

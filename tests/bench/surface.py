@@ -120,7 +120,7 @@ class Surface:
 
     def length(self, place, image):
         """The length of the way from a place to a point of the surface: A*, the straight line being the bound."""
-        with self.linking:  # several maps onto one surface are measured at once
+        with self.linking:  # several maps onto one surface are measured together
             if self.links is None:
                 self.link_vertices()
         start, end = self.position(place), self.triangle_at(image)

@@ -70,7 +70,7 @@ test('a page of another origin shows signed morphs', async (t) => {
     const headers = { authorization: `Bearer ${token}` };
     ids.push((await d.request('POST', `/v1/meshes?name=${called}`, { body, headers })).json.id);
   }
-  // The daemon counts what reaches it.
+  // The daemon counts the requests that reach it.
   const requests = async () => Number(/requests=(\d+)/.exec(await admin(d, 'key', 'list'))[1]);
   const jobs = async () =>
     (await d.get('/v1/jobs', { headers: { authorization: `Bearer ${token}` } })).json.jobs.length;
@@ -82,7 +82,7 @@ test('a page of another origin shows signed morphs', async (t) => {
     });
   const context = await browser.newContext();
   t.after(() => context.close());
-  /** What a new page shows for each of the sources, one after the other: to open a page takes seconds. */
+  /** The picture of a new page for each of the sources, one after the other: opening a page takes seconds. */
   const show = async (page, src, ...others) => {
     const tab = await context.newPage();
     const result = async () => (await tab.waitForFunction(() => window.result, null, { timeout: 120_000 })).jsonValue();

@@ -1,6 +1,6 @@
-/* Writes the assets that the conformance tests read: NAME.glb, and NAME.json with the expected facts,
- * {"triangles": [[a,b,c]…], "shapes": [[x,y,z, …]…]} in doubles. Also NAME.quantized.glb and NAME.meshopt.glb, each
- * with a .json of the bounds on what it changes. The shapes are formulas on a globe. */
+/* Writes the assets that the conformance tests read: NAME.glb, and NAME.json with the expected facts, {"triangles":
+ * [[a,b,c]…], "shapes": [[x,y,z, …]…]} in doubles. Also NAME.quantized.glb and NAME.meshopt.glb, each with a .json of
+ * the bounds on their differences. The shapes are formulas on a globe. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

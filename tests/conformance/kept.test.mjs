@@ -20,7 +20,7 @@ try {
   process.exit(0);
 }
 
-/** What the validator has to say, but for hints about the vendor's extension. */
+/** The messages of the validator, except for hints about the vendor's extension. */
 async function complaints(bytes) {
   const report = await validator.validateBytes(new Uint8Array(bytes), { maxIssues: 100 });
   return report.issues.messages.filter((m) => m.severity < 2);
@@ -35,7 +35,7 @@ async function load(bytes) {
   return { gltf, bodies };
 }
 
-/** The points of a skinned mesh in the scene, with the joints as they stand and these weights. */
+/** The points of a skinned mesh in the scene, with the current joints and these weights. */
 function shown(body, weights) {
   weights.forEach((w, k) => {
     body.morphTargetInfluences[k] = w;

@@ -22,7 +22,7 @@ if (![...needed, executablePath].every((file) => fs.existsSync(file))) {
 const { chromium } = await import('playwright-core');
 const validator = (await import('gltf-validator')).default;
 globalThis.self ??= globalThis;
-globalThis.createImageBitmap ??= async () => ({ width: 1, height: 1, close() {} }); // pictures are not looked at here
+globalThis.createImageBitmap ??= async () => ({ width: 1, height: 1, close() {} }); // this test does not look at pictures
 const { GLTFLoader } = await import('three/addons/loaders/GLTFLoader.js');
 
 /** A round cube: six faces of n × n squares, each with texture coordinates from 0 to 1 and smooth normals. */
@@ -126,7 +126,7 @@ const glass = {
 };
 const flat = { name: 'flat', extensions: { KHR_materials_unlit: {} } };
 
-/** The round cube with these materials, its faces shared out among them. */
+/** The round cube with these materials, which its faces share. */
 function dressed(materials, { uv1, bumps = bumpy(0.8, 0.8) } = {}) {
   const cube = roundCube();
   const third = Math.ceil(cube.triangles.length / materials.length);
@@ -181,7 +181,7 @@ async function materialsOf(bytes) {
   return found;
 }
 
-/** What three.js has of a material, but for numbers that it gives to each object. */
+/** The members of a material in three.js, except for numbers that it gives to each object. */
 function parameters(material) {
   const out = {};
   for (const [key, value] of Object.entries(material)) {
@@ -351,6 +351,6 @@ test('the asset looks like the file, with its bumps and its transform', async (t
     apart('file.glb', `${name}.glb`),
   );
   t.diagnostic(`mean differences from the file: ${[same, ...others].map((x) => x.toFixed(2)).join(', ')}`);
-  // The asset has one tangent a vertex, three.js computes one a pixel where the file has none.
+  // The asset has one tangent per vertex; three.js computes one per pixel if the file has none.
   assert.ok(same < 0.4 * Math.min(...others), `${same} of ${others}`);
 });

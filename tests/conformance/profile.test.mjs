@@ -1,5 +1,5 @@
-// The profiles of the assets that the fixture writes: the Khronos validator accepts them, and what three.js decodes lies
-// within the stated bounds of the float asset.
+// The profiles of the assets that the fixture writes: the Khronos validator accepts them, and the data that three.js
+// decodes are within the stated bounds of the float asset.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -103,7 +103,7 @@ for (const name of names) {
       assert.deepEqual([extensionsUsed, extensionsRequired], [expected, expected]);
     });
 
-    // In the overlay, vertices lie closer together than the bounds tell apart.
+    // In the overlay, some vertices are closer together than the bounds.
     if (name === 'painted') continue;
     test(`${name}, ${profile}: three.js decodes it within the bounds`, async () => {
       const bounds = boundsOf(`${name}.${profile}`);

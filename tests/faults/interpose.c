@@ -28,8 +28,8 @@ enum kind { ALLOC, WRITE, FSYNC, RENAME, FOLDER, OPEN, THREAD, SQLITE };
 enum { DEPTH = 7, SHOWN = 16, SITES = 1 << 16 };
 enum mode { OFF, ONCE, FOR_EVER };
 
-/* Shared by the test and the program. A site is the chain of the innermost callers, as offsets in their modules, so
- * that a restart keeps it. */
+/* Shared by the test and the program. A site is the chain of the innermost callers, as offsets in their modules, so it
+ * is the same after a restart. */
 struct board {
   atomic_uint mode; /* written last */
   uint32_t kind;
@@ -61,7 +61,7 @@ static void *map_file(const char *file, size_t size) {
 __attribute__((constructor)) static void begin(void) {
   void *frames[4];
   inside++;
-  backtrace(frames, 4);   /* loads what it needs now */
+  backtrace(frames, 4);   /* loads its symbols now */
   unsetenv("LD_PRELOAD"); /* children run without faults */
   sites = map_file(getenv("ORB_FAIL_SITES"), SITES * sizeof *sites);
   board = sites ? map_file(getenv("ORB_FAIL_BOARD"), sizeof *board) : NULL;
@@ -314,7 +314,7 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
   return fail(THREAD) ? EAGAIN : next(thread, attributes, run, user);
 }
 
-/* AddressSanitizer asks where a new thread has its stack, and ends the process when there is no memory to answer. */
+/* AddressSanitizer asks where a new thread has its stack, and ends the process if there is no memory for the answer. */
 int pthread_getattr_np(pthread_t thread, pthread_attr_t *attributes) {
   NEXT(int, "pthread_getattr_np", pthread_t, pthread_attr_t *);
   inside++;

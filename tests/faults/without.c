@@ -1,4 +1,4 @@
-/* Runs a program as on a kernel that lacks landlock or seccomp filters, or where a unit denies all addresses.
+/* Runs a program as if the kernel lacked landlock or seccomp filters, or as if a unit denied all addresses.
  *   without landlock|seccomp|addresses PROGRAM [ARGUMENT…] */
 #include <errno.h>
 #include <seccomp.h>

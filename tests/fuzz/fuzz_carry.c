@@ -1,5 +1,6 @@
-/* Feeds bytes as a glTF document from which something is taken: sets, skin and targets; and, as a GLB, gets something:
- * a set, a variant, its own skin. What is written must be read again as the same surface. A PNG or JPEG is decoded. */
+/* Feeds bytes as a glTF document from which sets, skin and targets are carried over; and, as a GLB, as an asset that
+ * receives a set, a variant or its own skin. The written document must be read again as the same surface. A PNG or JPEG
+ * is decoded. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>

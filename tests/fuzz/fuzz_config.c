@@ -1,5 +1,5 @@
-/* A config file, read as the daemon reads it. A configuration that is accepted holds texts that end and numbers within
- * their bounds. Run with -close_fd_mask=2: each refusal says why on standard error. */
+/* A config file, read as the daemon reads it. An accepted configuration has terminated texts and numbers within their
+ * bounds. Run with -close_fd_mask=2: each refusal prints its reason on standard error. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,5 @@
-/* The body of a request in gzip or zstd. The first byte says which, and in how small pieces it comes. What is unpacked
- * must not depend on the pieces; a sink that wants no more is left alone; what is held stays within a window of 8 MB.
- */
+/* The body of a request in gzip or zstd. The first byte selects the coding and the size of the pieces. The decompressed
+ * bytes must not depend on the pieces; a sink that refuses more gets no more; memory stays within a window of 8 MB. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +19,7 @@ typedef struct sink {
 static int take(void *user, const char *bytes, size_t size) {
   sink *s = user;
   if (s->stopped || size == 0) {
-    abort(); /* called again after it wanted no more, or for nothing */
+    abort(); /* called again after it refused more, or with nothing */
   }
   for (size_t i = 0; i < size; i++) {
     s->hash = (s->hash ^ (unsigned char)bytes[i]) * UINT64_C(0x100000001b3);
@@ -38,7 +37,7 @@ static decode_result unpack(coding which, const uint8_t *data, size_t size, size
   }
   for (size_t at = 0; at < size && result == DECODE_OK; at += piece) {
     size_t n = size - at < piece ? size - at : piece;
-    char *exact = malloc(n); /* a byte beyond is seen */
+    char *exact = malloc(n); /* the sanitizer sees a byte beyond */
     if (!exact) {
       abort();
     }

@@ -1,7 +1,7 @@
-/* Bytes of a connection to the whole service: requests as they come over the wire. The first byte says whether tokens
- * are needed and in how many parts the rest is sent. No worker runs, so jobs stay queued and the outcome does not
- * depend on time. No answer may be 500, and each answer begins as HTTP does. The data folder is made in $TMPDIR; run.sh
- * removes it. */
+/* Bytes of a connection to the whole service: requests as they arrive over the network. The first byte says whether
+ * tokens are needed and in how many parts the rest is sent. No worker runs, so jobs stay queued and the outcome does
+ * not depend on time. No answer may be 500, and each answer begins as HTTP does. The target creates the data folder in
+ * $TMPDIR; run.sh removes it. */
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -74,7 +74,7 @@ static int open_connection(void) {
   return fd;
 }
 
-/* Up to its end, or until the other side has nothing more to say for a while. */
+/* Reads up to the end, or until the other side is silent for a while. */
 static void check_reply(int fd) {
   static char text[REPLY_MOST + 1];
   size_t size = 0;

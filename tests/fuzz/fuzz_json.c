@@ -1,5 +1,5 @@
-/* A JSON body: parsed, read as each request of the API and as a landmark file. What is accepted must write itself
- * canonically, and its canonical text must read back to the same text. */
+/* A JSON body: parsed, and read as each request of the API and as a landmark file. An accepted body must be written in
+ * canonical form, and its canonical text must read back to the same text. */
 #include <stdlib.h>
 #include <string.h>
 

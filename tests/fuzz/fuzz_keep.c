@@ -1,5 +1,5 @@
-/* Feeds bytes as a glTF document that stays and gets targets. What is written must be read again as the same surface.
- * The first byte chooses which vertices move. */
+/* Feeds bytes as a glTF document that is kept and gets targets. The written document must be read again as the same
+ * surface. The first byte chooses which vertices move. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>

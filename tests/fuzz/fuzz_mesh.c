@@ -1,5 +1,5 @@
-/* Feeds bytes to one reader and what it makes of them to the repairs: nothing may crash or hang, or take more memory
- * and processor time than the multiples of docs/limits.md allow for the bytes. */
+/* Feeds bytes to one reader and its result to the repairs: nothing may crash or hang, or take more memory and processor
+ * time than the multiples of docs/limits.md allow for the bytes. */
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -10,14 +10,14 @@
 #include "../unit/support_zip.h"
 #include "orbmorph/format.h"
 
-/* Bytes of memory a byte, by format (docs/limits.md). */
+/* Bytes of memory per byte, by format (docs/limits.md). */
 static const size_t multiples[] = {
     [ORB_FORMAT_OBJ] = 110,  [ORB_FORMAT_OFF] = 110, [ORB_FORMAT_PLY] = 200, [ORB_FORMAT_STL] = 12,
     [ORB_FORMAT_GLTF] = 200, [ORB_FORMAT_GLB] = 200, [ORB_FORMAT_3MF] = 120};
 enum { MEMORY_AT_LEAST = FUZZ_FORMAT == ORB_FORMAT_3MF ? 6 << 20 : 2 << 20, MEMORY_A_BYTE_REPAIRED = 400 };
 
-/* 2 µs a byte, as docs/limits.md says, for a build with sanitizers and coverage; SECONDS_AT_LEAST covers the constants
- * of that page. */
+/* 2 µs per byte, as docs/limits.md says, for a build with sanitizers and coverage; SECONDS_AT_LEAST covers the
+ * constants of that page. */
 static const double SECONDS_A_BYTE = 2e-6 * 60, SECONDS_AT_LEAST = 3;
 
 static double cpu_seconds(void) {
@@ -39,7 +39,7 @@ static void check_cost(const orb_context *ctx, size_t size, size_t multiple, dou
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* The XML of 3MF: an input that is not an archive becomes one, whose sum is right, so that changes of it reach the
+/* The XML of 3MF: an input that is not an archive becomes one with a correct checksum, so that mutations reach the
  * reader. Bytes after a 0 are a second file. */
 static archive archive_of(const uint8_t *data, size_t size) {
   archive a = {0};
@@ -94,7 +94,7 @@ static int fuzz(const uint8_t *data, size_t size) {
           (orb_mesh_topology(ctx, &copy, &topology) != ORB_OK || topology.components != 1 || topology.genus != 0 ||
            topology.boundary_edges || topology.nonmanifold_edges || topology.nonmanifold_vertices ||
            !topology.consistent || copy.triangle_count < 4)) {
-        abort(); /* accepted, and yet not a sphere */
+        abort(); /* accepted although it is not a sphere */
       }
       orb_mesh_free(ctx, &copy);
     }

@@ -1,5 +1,5 @@
 /* A request line and its fields: lines of METHOD, path, query (NAME=VALUE&…, percent-encoded), then Prefer, trace,
- * tags, Priority, the number of an event, and the coding of a body. Numbers that come out must lie in their bounds. */
+ * tags, Priority, the number of an event, and the coding of a body. The parsed numbers must be within their bounds. */
 #include <microhttpd.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,7 +32,7 @@ static char *value_of(char *query, const char *name) {
   return NULL;
 }
 
-/* A list of transfers that is accepted is within its bounds, and its canonical form says the same. */
+/* An accepted list of transfers is within its bounds, and its canonical form means the same. */
 static void read_transfer(const char *text) {
   orb_carry read[ORB_CARRY_MAX], again[ORB_CARRY_MAX];
   int32_t count = 0, same = 0;

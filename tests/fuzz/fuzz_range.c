@@ -1,4 +1,5 @@
-/* A Range header: the first 8 bytes are the size of the file, the rest is the header. What is served lies within. */
+/* A Range header: the first 8 bytes are the size of the file, the rest is the header. The served range must be within
+ * the file. */
 #include <stdlib.h>
 #include <string.h>
 

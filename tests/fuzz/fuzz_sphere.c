@@ -1,5 +1,5 @@
-/* A stored embedding: two bytes each for the counts of vertices and triangles, then the object as it lies on the disk.
- * What is taken has every point on the sphere; the object is also read as the PLY file that callers get. */
+/* A stored embedding: two bytes each for the counts of vertices and triangles, then the object as stored on the disk.
+ * An accepted embedding has every point on the sphere; the object is also read as the PLY file that callers get. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     return 0;
   }
   int32_t vertices = data[0] | data[1] << 8, triangles = data[2] | data[3] << 8;
-  unsigned char *object = malloc(size - 4 + (size == 4)); /* exactly, so that a byte beyond is seen */
+  unsigned char *object =
+      malloc(size - 4 + (size == 4)); /* exactly this size, so that the sanitizer sees a byte beyond */
   if (!object) {
     return 0;
   }

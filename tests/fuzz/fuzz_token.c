@@ -1,5 +1,5 @@
-/* Lines of the control socket, as the daemon carries them out on its catalogue of tokens, and the token of a request.
- * The data folder is made in $TMPDIR; run.sh removes it. */
+/* Lines of the control socket, carried out on a catalogue of tokens as in the daemon, and the token of a request. The
+ * target creates the data folder in $TMPDIR; run.sh removes it. */
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
   return 0;
 }
 
-/* The catalogue holds names that end, few enough, and no token of a name twice. */
+/* The catalogue has terminated names, no more than allowed, and each name once. */
 static void check_tokens(int clear) {
   int count;
   token_row *rows = catalogue_tokens(cat, &count);

@@ -1,7 +1,7 @@
-/* Feeds bytes as a compressed glTF document that stays and gets a target, so that it is unpacked. What is written must
- * be read again as the same: surface, colours, texture coordinates, skin and old targets, number by number. The first
- * byte chooses which vertices move. Inputs are GLB; mutations keep its lengths right, so that they reach the
- * decoders. */
+/* Feeds bytes as a compressed glTF document that is kept and gets a target, so that it is decompressed. The written
+ * document must be read again with the same surface, colours, texture coordinates, skin and old targets, number by
+ * number. The first byte chooses which vertices move. Inputs are GLB; mutations keep its lengths right, so that they
+ * reach the decoders. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsigned seed);
 size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t max_size);
 
-/* Names the line: the compiler makes one call of abort() of all. */
+/* Names the line: the compiler merges all calls of abort(). */
 #define must(holds) ((holds) ? (void)0 : end(__LINE__))
 
 static void end(int line) {
@@ -149,7 +149,7 @@ static size_t change_number(uint8_t *text, size_t size, unsigned seed) {
 }
 
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsigned seed) {
-  const size_t before = 1 + HEAD + CHUNK; /* the choice, and what is before the JSON */
+  const size_t before = 1 + HEAD + CHUNK; /* the choice, and the bytes before the JSON */
   const size_t json = size > before ? u32_at(data + 1 + HEAD) : 0;
   const unsigned part = seed % 8;
   if (part == 0 || json == 0 || size < before + CHUNK || json > size - before - CHUNK) {

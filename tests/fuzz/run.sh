@@ -29,7 +29,7 @@ sums() {
   done
 }
 
-# Unpacks seeds whose archive has changed, and leaves the others: they may have edits that are not packed yet.
+# Unpacks seeds whose archive has changed, and keeps the others: they may have edits that are not packed yet.
 unpack() {
   local name=$1 archive=tests/fuzz/corpus/$1.tar.gz seeds=build-fuzz/seeds/$1 sum
   sum=$(sha256sum <"$archive")
@@ -41,7 +41,7 @@ unpack() {
   fi
 }
 
-# Packs seeds; an archive that holds the same inputs stays as it is, whichever gzip wrote it.
+# Packs seeds; an archive with the same inputs stays unchanged, whichever gzip wrote it.
 pack() {
   local name=$1 archive=tests/fuzz/corpus/$1.tar.gz seeds=build-fuzz/seeds/$1 packed
   packed=$(mktemp)
@@ -63,7 +63,7 @@ cpu_of() {
   echo $(((${12} + ${13}) / $(getconf CLK_TCK)))
 }
 
-# Runs a target; SIGUSR1 makes a fuzzer whose time is up end with its statistics.
+# Runs a target. When the time is up, SIGUSR1 makes the fuzzer end with its statistics.
 one() {
   local name=$1 seconds=$2 unit=$3 log=build-fuzz/corpus/$1.log status=0 used limit=$2 fuzzer
   mkdir -p "build-fuzz/corpus/$name"

@@ -32,7 +32,10 @@ const sets = {
   JOINTS_0: { rows: row((v) => [v % 2, 1 - (v % 2), 0, 0]), componentType: 5121 },
   WEIGHTS_0: { rows: row((v) => [v, 255 - v, 0, 0]), componentType: 5121, normalized: true },
 };
-/** Two joints, and a buffer view of its own for their matrices would be larger than the mesh: glTF has the identity. */
+/**
+ * Two joints. A separate buffer view for their matrices would be larger than the mesh, so they use glTF's default, the
+ * identity.
+ */
 const rig = (json) => {
   json.nodes.push({ children: [2] }, { translation: [0, 1, 0] });
   json.scenes[0].nodes.push(1);
@@ -40,7 +43,7 @@ const rig = (json) => {
   json.skins = [{ joints: [1, 2] }];
 };
 seed('draco_rigged', (await draco({ ...egg, sets, edit: rig })).glb);
-/** An accessor whose type is not that of what Draco holds, which wins. */
+/** An accessor whose type differs from that of the Draco data, which takes precedence. */
 const untrue = (json) => {
   json.accessors[json.meshes[0].primitives[0].attributes.TEXCOORD_0].type = 'VEC4';
 };

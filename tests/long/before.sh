@@ -37,7 +37,7 @@ for name in "$@"; do
   echo "== $name"
   timeout "$seconds" node --test --test-timeout="${seconds}000" ${ORB_BEFORE_TESTS:+"--test-name-pattern=$ORB_BEFORE_TESTS"} \
     "tests/${name/.//}.test.mjs" >"$at/out" 2>&1 || [ $? -ne 124 ] || echo "not ok: stopped after $seconds s"
-  # of each failure, the first four lines of its error: what was expected, and what was waited for
+  # prints the first four lines of each failure's error: what was expected, and what the test waited for
   awk '/^(not )?ok / { print }
     /^  error:/ { left = 4; sub(/^ *error: */, ""); sub(/^\|-$/, "") }
     /^  code:/ { left = 0 }

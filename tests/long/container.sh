@@ -16,14 +16,14 @@ if [ ! -f "$at/base/.whole" ]; then
   debootstrap --variant=minbase bookworm "$at/base" "$mirror"
   touch "$at/base/.whole"
 fi
-# Certificates that were added to this machine hold for the build, too: a proxy may ask for them.
+# The build also trusts certificates that were added to this machine: a proxy may need them.
 mkdir -p "$at/base/usr/local/share/ca-certificates"
 cp /usr/local/share/ca-certificates/*.crt "$at/base/usr/local/share/ca-certificates/" 2>/dev/null || true
 echo 'cafile=/etc/ssl/certs/ca-certificates.crt' >"$at/base/root/.npmrc"
 if ! podman "${own[@]}" image exists docker.io/library/debian:12-slim; then
   tar -C "$at/base" -c . | podman "${own[@]}" import --quiet - docker.io/library/debian:12-slim
 fi
-# Chroots instead of containers for the steps: that works inside of other containers, too.
+# Chroots instead of containers for the steps: this also works inside other containers.
 buildah "${own[@]}" bud --layers --isolation=chroot --pull-never --format docker -f deploy/Dockerfile -t orbmorph .
 
 # Without systemd, which podman would ask for cgroups and timers; limits that need no privilege.
@@ -57,7 +57,7 @@ asset=$(ask -H 'Content-Type: application/json' -H 'Prefer: wait=60' -d "{\"shap
 ask "http://127.0.0.1:$port$asset" >"$at/asset.glb"
 [ "$(head -c 4 "$at/asset.glb")" = glTF ]
 
-# A job that takes long: what its process may do, as the kernel of this machine says.
+# A job that takes long: what its process may do, according to the kernel of this machine.
 says() { sed -n "s/^$2:[[:space:]]*//p" "/proc/$1/status"; }
 daemon=$("${run[@]}" inspect --format '{{.State.Pid}}' "$name")
 zygote=$(pgrep -P "$daemon" -f isolated-processes)
@@ -74,7 +74,7 @@ for pid in "$daemon" "$worker"; do
   [ "$(says "$pid" NoNewPrivs)" = 1 ] && [ "$(says "$pid" Seccomp)" = 2 ]
   [ "$(says "$pid" Uid | cut -f1)" = "$owner" ]
 done
-# The job's process has a filter of its own beside the container's.
+# The job's process has its own filter in addition to the container's.
 [ "$(says "$worker" Seccomp_filters)" -gt "$(says "$daemon" Seccomp_filters)" ]
 ask -X DELETE "http://127.0.0.1:$port$job" >/dev/null
 "${run[@]}" exec "$name" curl -fsS "http://127.0.0.1:$port/livez" >/dev/null

@@ -33,7 +33,7 @@ const ways = ['segv', 'bus', 'SIGKILL', 'oom', 'loop', 'exit'];
 const died = Object.fromEntries(ways.map((way) => [way, 0]));
 const hurt = spawn('python3', [new URL('hurt.py', import.meta.url).pathname], { stdio: ['pipe', 'pipe', 'ignore'] });
 const answers = readline.createInterface({ input: hurt.stdout })[Symbol.asyncIterator]();
-/** Makes a process die, or loop for ever; false if it has ended meanwhile. */
+/** Makes a process die, or loop forever; false if it has ended meanwhile. */
 async function kill(pid, way) {
   if (way !== 'SIGKILL') {
     hurt.stdin.write(`${pid} ${way}\n`);

@@ -34,7 +34,7 @@ def ptrace(what, pid, address=0, data=0):
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
 
 
-# What the process runs next, and the registers that this needs.
+# The code that the process runs next, and the registers that it needs.
 WAYS = {
     "segv": ("488b00", {"rax": 0}),  # mov rax, [rax]
     "bus": ("488b442401", {"eflags": 0x40000}),  # AC; mov rax, [rsp + 1]
@@ -51,7 +51,7 @@ def poison(pid, way):
     ptrace(GETREGS, pid, 0, ctypes.addressof(now))
     for name, value in registers.items():
         setattr(now, name, value | (now.eflags if name == "eflags" else 0))
-    now.orig_rax = 2**64 - 1  # a system call that was interrupted is not begun again
+    now.orig_rax = 2**64 - 1  # an interrupted system call is not restarted
     ptrace(SETREGS, pid, 0, ctypes.addressof(now))
     ptrace(POKETEXT, pid, now.rip, int.from_bytes(bytes.fromhex(code).ljust(8, b"\x90"), "little"))
 

@@ -1,5 +1,5 @@
-// orbmorphd migrate is killed at ORB_KILLS (200) random moments, on the way between SQLite and PostgreSQL, files and S3 in
-// all four ways. After each kill no daemon starts on the target; in the end all is there. ORB_SEED chooses the moments.
+// Kills orbmorphd migrate at ORB_KILLS (200) random moments, on all four ways between SQLite and PostgreSQL, files and
+// S3. After each kill no daemon starts on the target; in the end all data exist there. ORB_SEED chooses the moments.
 // Runs under tests/tools/with_postgresql.sh and tests/tools/with_s3.sh.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn, spawnSync } from 'node:child_process';
@@ -66,7 +66,7 @@ for (let round = 1; done < kills; round++) {
       break;
     }
     done++;
-    if (!/^(copying|going on)$/m.test(out)) continue; // perhaps nothing is written yet
+    if (!/^(copying|going on)$/m.test(out)) continue; // the run may have written nothing so far
     const { status, stdout, stderr } = check(to);
     assert.ok((status === 78 && /in part/.test(stderr)) || (status === 0 && stdout === whole), stdout + stderr);
     refused += status === 78;

@@ -1,4 +1,4 @@
-// Distances of points from a surface, by a tree of boxes over all triangles; nothing of orbmorph is used.
+// Distances of points from a surface, by a tree of boxes over all triangles, independent of orbmorph.
 import { toTriangle } from '../scenario/support/distance.mjs';
 
 const LEAF = 8; // triangles

@@ -46,7 +46,7 @@ done
 cp tests/samples/dog.obj tests/samples/giraffe.off "$debian/root/"
 inside() { DEBIAN_FRONTEND=noninteractive LC_ALL=C chroot "$debian" "$@"; }
 inside apt-get update -qq
-# What the package does not ask for is not there: only it and curl are installed.
+# Packages that orbmorph does not depend on are not installed: only it and curl are.
 inside apt-get install -qq -y --no-install-recommends /root/orbmorph.deb curl >"$at/install.log" 2>&1 || { cat "$at/install.log"; exit 1; }
 
 inside orbmorphd --version
@@ -61,7 +61,8 @@ grep -o '](\(docs\|client\|CONTRIBUTING\|SECURITY\)[^)#]*' "$debian/usr/share/do
   [ -e "$debian/usr/share/doc/orbmorph/$link" ] || { echo "the installed README's link $link leads nowhere"; exit 1; }
 done
 
-# As the unit starts it: the installed configuration, the package's user. --listen: another port than one in use here.
+# Starts the daemon as the unit does: with the installed configuration, as the package's user. --listen: a port that is
+# free here.
 inside su -s /bin/sh orbmorph -c 'exec orbmorphd --config /etc/orbmorph/orbmorphd.conf --listen 127.0.0.1:0' >"$at/daemon.out" 2>"$at/daemon.log" &
 daemon=$!
 for _ in $(seq 100); do
@@ -82,7 +83,7 @@ wait "$daemon" || true
 daemon=
 inside su -s /bin/sh orbmorph -c 'orbmorphd --check-data --data /var/lib/orbmorph'
 
-# The library: a program built with the development package runs where only liborbmorph1 is left.
+# The library: a program built with the development package runs with liborbmorph1 alone.
 [ ! -e "$debian/usr/include/orbmorph" ]
 inside apt-get install -qq -y --no-install-recommends /root/liborbmorph1.deb /root/liborbmorph-dev.deb gcc libc6-dev pkg-config \
   >"$at/install.log" 2>&1 || { cat "$at/install.log"; exit 1; }

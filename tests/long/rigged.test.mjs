@@ -17,8 +17,8 @@ import { sheet } from './sheet.mjs';
 
 need('three', 'babylonjs', 'babylonjs-loaders');
 
-const OFF = 2e-5; // of a figure two units tall: programs add up in 32 bits
-const JOINT = 9; // what the animation "wave" turns, after half a second by 0.6 around z
+const OFF = 2e-5; // of a figure two units tall: programs compute in 32 bits
+const JOINT = 9; // the joint that the animation "wave" rotates: after half a second by 0.6 around z
 const ANGLE = 0.6;
 const AT = (JOINT * 2) / 19;
 
@@ -33,7 +33,10 @@ const poses = [
   ['bent, a new target', 0.5, [0, 1, 0]],
 ].map(([name, time, weights]) => ({ name, time, weights }));
 
-/** Where the glTF specification puts the vertices of a pose: targets, then joints. All below JOINT stay, the others turn. */
+/**
+ * The places of the vertices of a pose by the glTF specification: targets, then joints. Those below JOINT stay, the
+ * others rotate.
+ */
 function expected(asset, { time, weights }) {
   const { gltf, read } = parseGlb(asset);
   return gltf.meshes[1].primitives.flatMap(({ attributes, targets }) => {
@@ -176,7 +179,7 @@ after(async () => {
   await rm(folder, { recursive: true, force: true });
 });
 
-/** That the points are where they should be, in their order. */
+/** Asserts that the points are where they should be, in their order. */
 function assertThere(points, wanted, what) {
   assert.equal(points.length, wanted.length, what);
   const off = Math.max(...wanted.map((p, v) => Math.hypot(...p.map((x, k) => x - points[v][k]))));

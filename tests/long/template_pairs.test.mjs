@@ -1,5 +1,5 @@
-// The method "template" on every real pair with its landmarks: each vertex of the target lies on the other shape, and the
-// stated error is no less than what an independent measure finds, both ways.
+// The method "template" on every real pair with its landmarks: each vertex of the target is on the other shape, and the
+// stated error is at least that of an independent measure, in both directions.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import test from 'node:test';
@@ -11,7 +11,7 @@ import * as shapes from '../scenario/support/shapes.mjs';
 import { samples, surface } from './nearest.mjs';
 
 const MORE = 200_000; // points at random, beside vertices and middles
-const FLOAT = 1e-6; // of the diagonal: what rounding to float32 costs
+const FLOAT = 1e-6; // of the diagonal: the rounding to float32
 
 const worstOf = (points, distance) => points.reduce((worst, p) => Math.max(worst, distance(p)), 0);
 

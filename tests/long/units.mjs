@@ -91,7 +91,7 @@ const post = async (path, body, type) => {
   return reply.json();
 };
 
-/** The same morph with nothing but the names of the shapes. */
+/** The same morph with only the names of the shapes. */
 async function byApi(file) {
   const meshes = [];
   for (const [name, path] of [

@@ -1,7 +1,7 @@
-/* Writes the samples, or checks that the files in a folder are what would be written.
+/* Writes the samples, or checks the files in a folder against them.
  *
  *   orbmorph-samples DIR          writes them
- *   orbmorph-samples --check DIR  ends with 1, and says which file, where a byte differs
+ *   orbmorph-samples --check DIR  ends with 1 if a byte differs, and names the file
  *   orbmorph-samples --coarse DIR writes the same animals with a quarter of the triangles, for tests with sanitizers
  */
 #include <stdio.h>

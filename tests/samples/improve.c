@@ -1,4 +1,4 @@
-/* Better triangles: smoothing along the surface, and decimation that keeps what is curved. */
+/* Better triangles: smoothing along the surface, and decimation that keeps curved parts. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -71,7 +71,7 @@ static double dot(const double *a, const double *b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Long edges and those over bends are dear. */
+/* Long edges and edges over bends cost more. */
 static double edge_cost(const orb_sample *mesh, const double *normals, double detail, int a, int b) {
   double length2 = 0;
   for (int k = 0; k < 3; k++) {
@@ -138,7 +138,7 @@ static int may_collapse(const orb_sample *mesh, const int *first, const int *lis
   return 1;
 }
 
-/* Drops triangles that lost a corner and vertices that nothing uses. */
+/* Removes triangles that lost a corner and unused vertices. */
 static void compact(orb_sample *mesh, const int *moved_to) {
   int triangles = 0, vertices = 0, *number = sample_alloc((size_t)mesh->vertex_count, sizeof(int));
   for (int t = 0; t < mesh->triangle_count; t++) {
@@ -201,7 +201,7 @@ void sample_decimate(const orb_animal *animal, orb_sample *mesh, double detail, 
   }
 }
 
-/* Walks round v from triangle to triangle; the number of triangles that one fan holds. */
+/* Walks around v from triangle to triangle; returns the number of triangles in one fan. */
 static int fan_size(const orb_sample *mesh, const int *first, const int *list, int v) {
   const int *t = &mesh->triangles[3 * list[first[v]]];
   int begin = t[0] == v ? t[1] : t[1] == v ? t[2] : t[0], at = begin, size = 0;

@@ -156,7 +156,7 @@ void sample_surface_nets(const orb_animal *animal, double cell, orb_sample *out)
 
 /* The vertex on the grid edge from `a` to a corner `b` that lies above it in every coordinate. */
 typedef struct edge_map {
-  int *vertex; /* seven edges a grid point, −1: none yet */
+  int *vertex; /* seven edges per grid point, −1: none yet */
   int vertex_room;
 } edge_map;
 

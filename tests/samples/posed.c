@@ -89,7 +89,7 @@ static int *shuffled(int count, unsigned *seed) {
   return order;
 }
 
-/* The rows of a turn: none for a third of the bodies, about the vertical for a third, any for the others. */
+/* The rows of a rotation: none for a third of the bodies, about the vertical for a third, any for the others. */
 static void draw_turn(unsigned *seed, double row[3][3]) {
   const unsigned kind = posed_random(seed, 3);
   double q[4] = {1, 0, 0, 0}, norm = 0;

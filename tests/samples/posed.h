@@ -45,12 +45,12 @@ enum { POSED_BONES = 48 };
 /* What a primitive is as a bone. */
 typedef struct posed_bone {
   posed_limb limb;
-  int parent; /* the primitive that it hangs on; −1: the root */
+  int parent; /* the parent primitive; −1: the root */
 } posed_bone;
 
 typedef struct posed_kind {
   const orb_animal *animal;
-  const posed_bone *bones; /* one a primitive */
+  const posed_bone *bones; /* one per primitive */
 } posed_kind;
 
 const posed_kind *posed_find(const char *name);

@@ -1,4 +1,4 @@
-/* Bodies at rest: proportions, and triangles of their own for every body. */
+/* Bodies at rest: proportions, and different triangles for every body. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,7 +35,7 @@ static factors factors_of(posed_limb limb, const char *variant) {
   }
 }
 
-/* Where a place beside a bone goes when the bone gets other proportions: along it by its length, across by its radius.
+/* Where a place beside a bone moves when the bone gets other proportions: along it by its length, across by its radius.
  */
 static void carry(const orb_primitive *from, const orb_primitive *to, factors f, const double p[3], double out[3]) {
   double axis[3], length2 = 0, along = 0;

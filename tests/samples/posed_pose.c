@@ -1,4 +1,4 @@
-/* Poses: bones turn about their joints, and the skin follows by linear blend skinning. */
+/* Poses: bones rotate about their joints, and the skin follows by linear blend skinning. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,12 +8,12 @@
 
 enum { X, Y, Z }; /* about the right (Z) a limb below swings forward; about up (Y) what is ahead swings to the left */
 
-/* A turn of the bones of a limb against their parents. */
+/* A rotation of the bones of a limb relative to their parents. */
 typedef struct turn {
   const char *pose;
   posed_limb limb;
   int axis;
-  int every;   /* each bone of the limb turns, else the first one only */
+  int every;   /* each bone of the limb rotates, else only the first one */
   double half; /* the tangent of half the angle */
 } turn;
 
@@ -42,7 +42,7 @@ static const turn turns[] = {
     {"lift", HLU, Z, 0, -D15},   {"lift", TAIL, Z, 1, -D20},  {"nod", FACE, Z, 0, -D20},    {"look", FACE, Y, 0, D30},
 };
 
-/* A turn and a move: rows of the matrix, then the move. */
+/* A rotation and a translation: the rows of the matrix, then the translation. */
 typedef struct motion {
   double row[3][3], move[3];
 } motion;
@@ -108,7 +108,7 @@ static int steps_between(const posed_bone *bones, int a, int b) {
 }
 
 void posed_skin(const posed_rest *rest, const char *pose, orb_sample *mesh) {
-  const double reach = 0.10; /* over this distance the skin passes from one bone to the next */
+  const double reach = 0.10; /* the distance over which the skin changes from one bone to the next */
   motion of[POSED_BONES];
   move_bones(rest, pose, of);
   const int count = (int)rest->animal.primitive_count;

@@ -1,4 +1,4 @@
-/* Samples: rays from the bones, and where they leave a body at rest. */
+/* Samples: rays from the bones, and the points where they leave a body at rest. */
 #include <math.h>
 #include <string.h>
 
@@ -14,7 +14,7 @@ typedef struct ray {
 
 enum { FACE_RAYS = 90, RAYS_MOST = 1400 };
 
-/* Tips and what lies between them, in the order in which landmarks are given. */
+/* Tips and places between them, in the order in which landmarks are given. */
 static const ray first_rays[] = {
     {SNOUT, 1, {0, 0}, 1},   {FRF, 1, {0, 0}, 1},      {FLF, 1, {0, 0}, 1},      {HRF, 1, {0, 0}, 1},
     {HLF, 1, {0, 0}, 1},     {TAIL, 1, {0, 0}, 1},     {EAR_R, 1, {0, 0}, 1},    {EAR_L, 1, {0, 0}, 1},
@@ -38,7 +38,7 @@ static void add_limb(posed_limb limb) {
       rays[ray_count++] = (ray){limb, (s + 0.5) / steps, {directions[d][0], directions[d][1]}, 0};
 }
 
-/* Directions spread over the sphere: a spiral of equal steps in height, turned by about the golden angle each. */
+/* Directions spread over the sphere: a spiral of equal steps in height, each rotated by about the golden angle. */
 static void add_face(void) {
   double c = 1, s = 0;
   for (int i = 0; i < FACE_RAYS; i++) {

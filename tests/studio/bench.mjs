@@ -123,7 +123,7 @@ const frames = (page, step) =>
 const SCRUB =
   "const i = document.querySelector('.scrub input'); i.value = value; i.dispatchEvent(new Event('input', { bubbles: true }));";
 const middle = (list) => list.toSorted((a, b) => a - b)[list.length >> 1];
-const ROUNDS = 7; // of both pages in turns, so that what else the machine does hits both
+const ROUNDS = 7; // of both pages alternately, so that other load of the machine affects both
 const files = meshes.map((m, i) => {
   const path = join(folder, `shape${i}.obj`);
   writeFileSync(path, m.file);

@@ -1,5 +1,6 @@
-// How long a visitor waits for a morph: from the press of “Morph” to the picture of the fast one, and to the default one,
-// with files that are uploaded already. A fresh daemon for each round, so that nothing is stored. Medians.
+// Measures how long a visitor waits for a morph: from the press of “Morph” to the picture of the fast one, and to the
+// default one, with files that are already uploaded. Starts a fresh daemon for each round, so that nothing is stored.
+// Prints medians.
 //
 //   node tests/studio/bench_first.mjs [ROUNDS] [given|found | FILE FILE]
 //

@@ -1,4 +1,4 @@
-// A mesh that is kept as it came, and a shape for which it has too few triangles.
+// A mesh that the morph keeps unchanged, and a shape for which it has too few triangles.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { ball, obj } from '../scenario/support/shapes.mjs';
@@ -10,7 +10,7 @@ const hot = (r, g, b) => r > 130 && r > 2 * g && r > 1.5 * b;
 
 test('where a kept mesh is too coarse is said, and shown on it', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  // a blister on the side of the camera, on a body that the mesh can follow otherwise
+  // a blister on the side of the camera, on a body that the mesh can follow everywhere else
   const blistered = ball(5, (p) => {
     const far = (p[0] - 0.55) ** 2 + (p[1] - 0.3) ** 2 + (p[2] - 0.78) ** 2;
     return p.map((x) => x * (1 + 0.35 * Math.exp(-far / 0.01)));
@@ -34,14 +34,14 @@ test('where a kept mesh is too coarse is said, and shown on it', async () => {
   assert.equal(await button(page, 'Show where').count(), 0);
   const pane = page.locator('.pane').nth(1);
   assert.match(await pane.locator('.legend').innerText(), /how far blister is from the mesh of globe, shown/);
-  // the daemon and the page measure at other samples of the same two surfaces
+  // the daemon and the page measure at different samples of the same two surfaces
   const largest = Number((await pane.locator('.caption').innerText()).match(/largest ([\d.]+) %/)[1]) / 100;
   assert.ok(largest > 0.5 * errors[0] && largest < 1.5 * errors[0], `${largest}, reported ${errors[0]}`);
   await adopt(page, '.legend { visibility: hidden !important; }'); // it is red, too
   const red = await countPixels(page, '.pane:nth-child(2) .pane-view', hot);
   const blue = await countPixels(page, '.pane:nth-child(2) .pane-view', (r, g, b) => b > r + 15 && b > g && r < 70);
   assert.ok(red > 50 && blue > 10 * red, `red where it is missed, blue elsewhere: ${red}, ${blue}`);
-  // on the mesh itself there is only rounding
+  // the mesh itself differs only by rounding
   assert.ok((await countPixels(page, '.pane:nth-child(1) .pane-view', hot)) < 20);
   await done();
 });

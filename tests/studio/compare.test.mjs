@@ -1,4 +1,4 @@
-// What a morph is looked at beside: its shapes, their spheres and their errors.
+// A morph compared with its shapes, their spheres and their errors.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { browser, daemon } from './started.mjs';

@@ -1,4 +1,4 @@
-// What the morph takes from a later shape besides its surface, and the looks of its materials.
+// Carries over what a later shape has besides its surface, and its materials.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { mkdtempSync, rmSync } from 'node:fs';

@@ -13,8 +13,8 @@ const refuse = (route, title) =>
   });
 
 /**
- * A page with two shapes whose POST of a morph goes to `answer(kind, route)`; kind: fast or default. Returns the kinds in
- * the order of their requests, too.
+ * A page with two shapes whose POST of a morph goes to `answer(kind, route)`; kind: fast or default. Also returns the
+ * kinds in the order of their requests.
  */
 async function pageWith(answer) {
   const opened = await openPage(browser, daemon.url);
@@ -32,7 +32,7 @@ async function pageWith(answer) {
   return { ...opened, posted };
 }
 
-/** Asks for the morph, of which the fast one is requested first. */
+/** Requests the morph; the fast one is requested first. */
 async function morph(page, posted) {
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => posted.length, 'a morph is requested');
@@ -160,7 +160,7 @@ test('cancelling keeps the fast morph and stops the default one', async () => {
 test('progress names the morph and its stage', async () => {
   const { opened, open } = gate();
   const { page, posted, done } = await pageWith(async (kind, route) => {
-    if (kind === 'default') await opened; // or it may end before the fast one, which then is not waited for
+    if (kind === 'default') await opened; // or it may end before the fast one, and the page then does not wait for that
     await route.continue();
   });
   await page.evaluate(() => {

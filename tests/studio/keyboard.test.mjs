@@ -25,7 +25,7 @@ async function tabTo(page, name) {
   assert.fail(`no Tab leads to ${name}; it leads to ${JSON.stringify(passed)}`);
 }
 
-/** Records from now on where the focus was when it fell to the body, at the ends of frames. */
+/** Records from now on where the focus was before it fell to the body, at the ends of frames. */
 const watchFocus = (page) =>
   page.evaluate(() => {
     globalThis.lostFrom = [];
@@ -47,7 +47,7 @@ const watchFocus = (page) =>
 test('upload, landmarks, morph and export by the keyboard alone', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const kept = async (what) => assert.notEqual(await focused(page), null, `the focus is lost after ${what}`);
-  // early: a dialog that opens before the browser has been told to hand it over is lost
+  // early: a dialog that opens before the browser has handed over the focus is lost
   const choosing = page.waitForEvent('filechooser');
   await tabTo(page, /^Choose files$/);
   await watchFocus(page);
@@ -88,7 +88,7 @@ test('upload, landmarks, morph and export by the keyboard alone', async () => {
   await kept('the morph');
   await tabTo(page, /^Use it$/);
   await page.keyboard.press('Enter');
-  // a Tab before the dialog is open would still move the focus to which the dialog returns it
+  // a Tab before the dialog opens would still move the focus to which the dialog returns it
   await until(async () => (await page.locator('dialog[open]').count()) === 1, 'the drawer opens');
   await tabTo(page, /^GLB$/);
   const saving = page.waitForEvent('download');
@@ -100,7 +100,7 @@ test('upload, landmarks, morph and export by the keyboard alone', async () => {
   await until(async () => (await page.locator('dialog').count()) === 0, 'the drawer closes');
   assert.equal(await focused(page), 'Use it');
 
-  // what had the focus goes
+  // the focused element disappears
   await tabTo(page, /^Shapes$/);
   await page.keyboard.press('Enter');
   await tabTo(page, /^Remove giraffe$/);

@@ -120,7 +120,7 @@ test('a landmark is dragged to another place', async () => {
   await until(async () => (await loupe.count()) === 0, 'it is gone');
   await button(page, 'Undo').click();
   await until(async () => Math.abs((await middle()).x - at.x) < 1, 'a drag is one step');
-  // a landmark that goes while it is dragged takes the magnifier along
+  // a landmark that is deleted while it is dragged removes the magnifier, too
   at = await middle();
   await touch('pointerdown', at.x, at.y);
   for (let i = 1; i <= 4; i++) await touch('pointermove', at.x + 3 * i, at.y + 3 * i);
@@ -169,7 +169,7 @@ test('landmarks are found', async () => {
   const found = Number(text.match(/^(\d+) landmarks found/)?.[1] ?? 0);
   assert.equal(await landmarks(page).count(), found);
   assert.ok(found > 0 || /matched/.test(text), text);
-  // a job that has no name yet
+  // a job without a name so far
   await button(page, 'Clear').click();
   let asked = 0;
   await page.route('**/v1/supermeshes', (route) => asked++ && route.continue()); // the first one gets no answer

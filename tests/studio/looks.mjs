@@ -182,7 +182,7 @@ export const SCENES = {
 /** Hides what differs between runs: timings and the text cursor. */
 const STEADY = '[data-varies] { visibility: hidden !important; } * { caret-color: transparent !important; }';
 
-/** Opens a page and leads it to a scene. */
+/** Opens a page and goes to a scene. */
 async function open(browser, url, name) {
   const [reach, options, from] = SCENES[name];
   if (!from) {
@@ -197,8 +197,8 @@ async function open(browser, url, name) {
 }
 
 /**
- * Takes a picture of a scene as PNG, at half size or at full size (`whole`). A scene that begins at the one before goes on
- * with its page; `close` closes the page of the last one.
+ * Takes a picture of a scene as PNG, at half size or at full size (`whole`). A scene that begins at the previous one
+ * continues with its page; `close` closes the page of the last one.
  */
 export function photographer(browser, url) {
   let last = null; // { name, page, done }
@@ -211,7 +211,7 @@ export function photographer(browser, url) {
     const [reach, , from] = SCENES[name];
     const opened = last;
     if (opened && from === opened.name) {
-      last = null; // a scene that fails takes the page with it
+      last = null; // a failing scene closes the page
       await reach(opened.page);
       last = { ...opened, name };
     } else {

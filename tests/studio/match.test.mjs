@@ -1,4 +1,4 @@
-// A match that was found without landmarks: what the studio says of it, and the other matches.
+// A match that was found without landmarks: what the studio says about it, and the other matches.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { figure, obj } from '../scenario/support/shapes.mjs';
@@ -17,7 +17,10 @@ async function morphed(page) {
   return json(daemon.url, `/v1/supermeshes/${await shownId(page)}`);
 }
 
-/** The id of the morph that a request gives. A job that takes longer than one wait answers with its own id, half as long. */
+/**
+ * The id of the morph of a request. A job that takes longer than one wait answers with its own id, which is half as
+ * long.
+ */
 async function idOf(request) {
   const headers = { 'content-type': 'application/json', prefer: 'wait=60' };
   for (;;) {
@@ -31,7 +34,7 @@ async function idOf(request) {
   }
 }
 
-/** What is said of the alternatives of every result: up to four, the best first, each of one later shape, with its request. */
+/** Checks the alternatives of every result: up to four, the best first, each for one later shape, with its request. */
 function checkAlternatives({ alternatives, request }) {
   assert.ok(alternatives.length > 0 && alternatives.length <= 4, `${alternatives.length} alternatives`);
   const costs = alternatives.map(({ cost }) => cost);
@@ -58,7 +61,7 @@ test('three shapes: verdict, doubt, heat map, and the matches one after another,
   const other = ['dog', 'giraffe', 'elephant'][first.alternatives[0].shape];
   const doubt = new RegExp(`^Not sure: the \\w[\\w ]* of dog may be the \\w[\\w ]* of ${other}\\. Look at it`);
   await says(page, doubt, 'the doubt in words');
-  // the other matches take the head of the dog to a limb, or front to back: none has left and right swapped
+  // the other matches map the head of the dog to a limb, or front to back: none exchanges left and right
   assert.equal(await button(page, 'Flip').count(), 0);
   await button(page, 'Heat map').click();
   await until(async () => (await page.getByText(/^99 % of it below/).count()) === 3, 'three are measured');
@@ -98,7 +101,7 @@ test('Flip swaps left and right and back, also after a reload', async () => {
   await addFiles(page, ...files);
   const first = await morphed(page);
   const [other] = first.alternatives;
-  // what it takes from the left (x < 0) of the first figure lies on the right of the other one, and the other way round
+  // what it maps from the left (x < 0) of the first figure is on the right of the other one, and vice versa
   const across = ({ point, vertex, triangle, barycentric }, { positions, triangles }) => {
     if (point) return point[0];
     if (vertex !== undefined) return positions[vertex][0];
@@ -116,7 +119,7 @@ test('Flip swaps left and right and back, also after a reload', async () => {
   await button(page, 'Flip').click();
   await until(() => shown(page) === first.id, 'the first match again');
   assert.equal(await said(page).count(), 0, 'it is sure');
-  // a link that names the job of another match: the match is what it is when the job is done
+  // a link that names the job of another match: the page shows that match when the job is done
   const headers = { 'content-type': 'application/json', prefer: 'respond-async' };
   const body = JSON.stringify({ ...other.request, remesh: { ...other.request.remesh, tolerance: 0.0023 } });
   const { id: job } = await json(daemon.url, '/v1/supermeshes', { method: 'POST', headers, body });
@@ -153,7 +156,7 @@ test('an unsure match is labelled, and the next match gives another morph', asyn
   }
   await until(() => shown(page) === first.id, 'after the last comes the first');
   assert.equal(await button(page, 'Flip').count(), 0, 'the other match takes head to foot');
-  // there and back again; what led to it is listed
+  // there and back again; the requests that led to it are listed
   await button(page, 'Next match').click();
   await until(() => shown(page) === id, 'the other match');
   await button(page, 'Landmarks').click();
@@ -162,14 +165,14 @@ test('an unsure match is labelled, and the next match gives another morph', asyn
   await button(page, 'Morph', { exact: true }).click();
   await button(page, 'Next match').click();
   await until(() => shown(page) === first.id, 'the first one again');
-  // the heat map: blue where the surface is as it was, red where it is stretched badly
+  // the heat map: blue where the surface keeps its size, red where it is stretched badly
   await button(page, 'Heat map').click();
   await until(() => page.getByText(/^99 % of it below/).count(), 'it is measured');
   await settled(page);
   assert.equal(await page.locator('.pane').count(), 2);
   assert.ok((await countPixels(page, '.stage-area', (r, g, b) => b > r + 15 && b > g && r < 70)) > 5000, 'blue');
   assert.ok((await countPixels(page, '.pane-view', (r, g, b) => r > 120 && r > 2 * g && r > 1.5 * b)) > 100, 'red');
-  // what was found is in the list, and given once it is corrected
+  // the found landmark is in the list, and counts as given once it is corrected
   await button(page, 'Landmarks').click();
   await until(async () => (await landmarks(page).count()) === first.landmarks.length, 'the found landmarks');
   const hint = page.locator('.action .hint');

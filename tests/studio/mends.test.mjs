@@ -21,7 +21,7 @@ async function refused(page, name, surface) {
   assert.ok((await red(page)) > 20, 'red is drawn');
 }
 
-/** Waits until the mesh is taken, and checks that page and picture show the mended one. Returns it. */
+/** Waits until the mesh is accepted, and checks that page and picture show the mended one. Returns it. */
 async function mended(page, name) {
   await page.locator('.card.ready').waitFor();
   const mesh = (await json(daemon.url, '/v1/meshes?limit=100')).meshes.find((m) => m.name === name);

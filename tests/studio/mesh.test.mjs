@@ -531,7 +531,7 @@ test('the plane of symmetry is found however the shape lies, and only where it i
     positions: Float64Array.from(positions.flat()),
     corners: Uint32Array.from(triangles.flat()),
   });
-  // a body that z = 0 mirrors, with nothing else in common on its sides
+  // a body that is symmetric in z = 0; its sides have nothing else in common
   const body = flat(ball(3, ([x, y, z]) => [1.6 * x + 0.4 * z * z, y + 0.5 * x * x, (0.7 + 0.25 * x - 0.2 * y) * z]));
   for (const angle of [0, 0.4, 1.1]) {
     const rotation = turned(angle);
@@ -583,7 +583,7 @@ test('a repaired mesh: triangles of the file keep its look, patches are plain', 
       images: [image],
     },
   };
-  // what the daemon has: welded, some triangles begin with another corner, and a patch with a vertex of its own
+  // the daemon's mesh: welded, some triangles begin with another corner, and a patch with its own vertex
   const middle = positions.length;
   const [[a, b, c]] = triangles;
   const repaired = {
@@ -612,7 +612,7 @@ test('a repaired mesh: triangles of the file keep its look, patches are plain', 
   assert.equal(made.dress.cover[made.corners[0]], 0);
   assert.equal(made.dress.cover[made.corners[3 * kept - 1]], 1);
   assert.deepEqual(made.dress.images, [image]);
-  // of a file that only the daemon can read, the numbers alone are known
+  // for a file that only the daemon can read, the page knows only the numbers
   assert.equal(mesh.mendedMesh(repaired, undefined).raw.dress, undefined);
 });
 
@@ -715,7 +715,7 @@ test('another match: it flips if limbs change sides, and neither stay nor trade 
   ]);
   const sides = names.map(mesh.sideOf);
   assert.deepEqual(sides, [0, 0, -1, 1, -1, 1, NaN]);
-  /** The match that takes each of these landmarks of the first shape to that of the second. */
+  /** The match that maps each of these landmarks of the first shape to that of the second. */
   const match = (pairs) => {
     const places = pairs.map(([a, b]) => [found[a][0], found[b][1]]);
     const { flips, swaps } = mesh.otherOf(found, places, sides, [30, 30]);

@@ -1,4 +1,4 @@
-// The first minute: a page that moves, progress that moves, and what a visitor takes away.
+// The first minute: a page that moves, progress that moves, and the files that a visitor downloads.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
@@ -36,7 +36,7 @@ test('the first page plays a morph without a click, and offers three more', asyn
     await until(async () => (await difference(browser, before, await hero(page))) > 0.02, `${name} appears`);
   }
   assert.equal((await (await fetch(`${daemon.url}/v1/jobs`)).json()).jobs.length, 0, 'the daemon computed nothing');
-  // the shapes that play can be opened, and are accepted
+  // the shapes of the film can be opened, and are accepted
   await button(page, 'Try with samples').click();
   await counted(page.locator('.card.ready'), 3, 'its shapes are open');
   await done();
@@ -56,7 +56,7 @@ test('a visitor who prefers less motion gets a still picture that can be played'
 test('progress names the stage, says what is left, moves each second, and can be cancelled', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
-  // A job that reports once and then says nothing for long, as a long stage does.
+  // A job that reports once and then is silent for a long time, as in a long stage.
   const job = { id: '1'.repeat(32), url: `/v1/jobs/${'1'.repeat(32)}`, kind: 'supermesh', state: 'running' };
   Object.assign(job, { stage: 'align', progress: 0.4, result: null, problem: null, attempt: 1 });
   let cancelled = false;
@@ -93,7 +93,7 @@ test('progress names the stage, says what is left, moves each second, and can be
   await done();
 });
 
-/** A page with a morph of three animals that is ready to be taken away. */
+/** A page with a morph of three animals that is ready to be downloaded. */
 async function taking(options) {
   const opened = await openPage(browser, daemon.url, options);
   const { page } = opened;
@@ -239,7 +239,7 @@ test('pictures and films: PNG, GIF, WebP and video, named after the shapes', asy
   await done();
 });
 
-/** A closed surface as one triangle strip a ring, which only the daemon reads. */
+/** A closed surface with one triangle strip per ring, which only the daemon reads. */
 function strips() {
   const [rings, around] = [9, 16];
   const points = [[0, 1.4, 0]];
@@ -307,7 +307,10 @@ function dressed() {
   ];
 }
 
-/** How many pixels of the upper and the lower half of a view are red, green, blue: far stronger than the others. */
+/**
+ * The numbers of pixels of the upper and the lower half of a view that are red, green, blue: one channel far stronger
+ * than the others.
+ */
 async function halves(page, index) {
   await settled(page);
   const { x, y, width, height } = await page.locator('.pane-view').nth(index).boundingBox();
@@ -339,7 +342,7 @@ test('textures and colours of the files are on the stage, before and after the m
   await defaultShown(page);
   await button(page, 'Pause').click();
   upright(await halves(page, 0), 'the morph');
-  // decoded images are large: they are freed with what shows them, not when the browser finds the time
+  // decoded images are large: they are freed together with their view, not when the browser finds the time
   const drawing = page.workers().find((worker) => /draw/.test(worker.url()));
   await drawing.evaluate(() => {
     const close = ImageBitmap.prototype.close;

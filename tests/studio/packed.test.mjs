@@ -1,4 +1,4 @@
-// Compressed glTF is shown with its materials, as the plain file is.
+// The studio shows compressed glTF with its materials, like the uncompressed file.
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { draco } from '../scenario/support/draco.mjs';
@@ -38,7 +38,7 @@ const red = (page) => countPixels(page, '.pane-view', (r, g, b) => r > 90 && g <
 const blue = (page) => countPixels(page, '.pane-view', (r, g, b) => b > 90 && r < b / 2 && g < b / 2);
 const asFile = (name, buffer) => ({ name: `${name}.glb`, mimeType: 'model/gltf-binary', buffer });
 
-/** A picture of a file by itself, after it was looked at. */
+/** A picture of a single file, after the studio has opened it. */
 async function drawn(name, glb, look) {
   const { page, done } = await openPage(browser, daemon.url);
   const loaded = [];

@@ -18,7 +18,7 @@ export async function morph(page) {
   await defaultShown(page);
 }
 
-/** The id of the morph that is shown. The address follows a moment later: it may still name the fast one. */
+/** The id of the shown morph. The address follows a moment later: it may still name the fast one. */
 export async function shownId(page) {
   const link = await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href');
   const id = link.match(/[0-9a-f]{64}/)[0];
@@ -36,7 +36,7 @@ export const slide = (slider, value) =>
 export const scrubber = (page) => page.getByRole('slider', { name: 'Along the morph' });
 export const seek = (page, value) => slide(scrubber(page), value);
 
-/** Starts a daemon whose only worker another job occupies, until the test ends. */
+/** Starts a daemon whose only worker is busy with another job until the test ends. */
 export async function startOccupied(t) {
   const busy = await startDaemon({ args: ['--workers', '1'] });
   const post = async (path, body, headers) => (await fetch(busy.url + path, { method: 'POST', headers, body })).json();

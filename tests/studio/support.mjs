@@ -75,8 +75,8 @@ export const startBrowser = ({ compositing = 'software', program = executablePat
   });
 
 /**
- * At most eight frames a second on the page's main thread. What moves there draws as often as it gets frames, and software
- * GL takes a core for each of them as long as the test lasts.
+ * At most eight frames per second on the page's main thread. Moving parts draw in every frame, and software GL takes a
+ * core for each of them as long as the test lasts.
  */
 function slowFrames() {
   const [request, cancel] = [globalThis.requestAnimationFrame, globalThis.cancelAnimationFrame];
@@ -146,7 +146,7 @@ export async function until(check, what, limit = Number(process.env.ORB_LIMIT ??
   }
 }
 
-/** Waits until the page has that many of what a locator finds. */
+/** Waits until a locator finds this many elements. */
 export const counted = (locator, count, what) => until(async () => (await locator.count()) === count, what);
 
 export const button = (page, name, options) => page.getByRole('button', { name, ...options });

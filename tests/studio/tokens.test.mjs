@@ -1,4 +1,4 @@
-// With a daemon that requires tokens, the studio asks for one, keeps it for the tab and says what it does not allow.
+// With a daemon that requires tokens, the studio asks for one, keeps it for the tab and says what it does not permit.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';

@@ -114,7 +114,7 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
 test('a fit that turns a shape over is said', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const [dog, giraffe] = [await readFile(sample('dog.obj')), await readFile(sample('giraffe.off'), 'latin1')];
-  // by half a turn about x: what was up is down, and the fit turns it back by as much
+  // by half a turn about x: up becomes down, and the fit rotates it back by as much
   const over = giraffe.replace(/^(-?[\d.]+) (-?[\d.]+) (-?[\d.]+)$/gm, (line, x, y, z) =>
     /\./.test(line) ? `${x} ${-y} ${-z}` : line,
   );

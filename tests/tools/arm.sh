@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The embedding on 64-bit Arm, whose NEON the plain vector loops compile to: cross-compiled, and run by qemu's user emulation.
-# Unit tests, adversarial meshes, and the points of both methods compared with those of this machine.
+# The embedding on 64-bit Arm, where the plain vector loops compile to NEON: cross-compiled, and run by qemu's user
+# emulation. Runs unit tests and adversarial meshes, and compares the points of both methods with those of this machine.
 #
 #   tests/tools/arm.sh [EMBED-DIGEST]    the program built for this machine, build/bin/embed-digest by default
 #
@@ -16,7 +16,7 @@ flags=(-std=gnu17 -O3 -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -W
 sources=(core/{base,numeric,mesh,embed}/*.c)
 arm=aarch64-linux-gnu-gcc
 
-# cmocka for Arm, unpacked beside the system, which stays what it is.
+# cmocka for Arm, unpacked outside the system, which does not change.
 mkdir -p "$work"/{lists/partial,archives/partial,cmocka}
 touch "$work/status"
 apt=(apt-get -qq -o APT::Architecture=arm64 -o APT::Architectures=arm64 -o Dir::State="$work"

@@ -1,10 +1,10 @@
-// The browser of the tests: Debian's chromium-headless-shell, or its chromium where that is missing. Both draw pages with
-// the same code. The shell has no address bar, icons and menus to draw, so the tests take two thirds of the CPU time.
+// The browser of the tests: Debian's chromium-headless-shell, or its chromium if that is missing. Both draw pages with
+// the same code. The shell has no address bar, icons and menus to draw, so the tests take a third less CPU time.
 import { existsSync } from 'node:fs';
 
 const shell = '/usr/bin/chromium-headless-shell';
 
-/** What visitors have, for benchmarks. */
+/** The visitors' browser, for benchmarks. */
 export const wholeBrowser = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
 
 export const executablePath = process.env.ORB_CHROMIUM ?? (existsSync(shell) ? shell : wholeBrowser);

@@ -17,7 +17,7 @@ typedef struct extremes {
   char least[64], greatest[64];
 } extremes;
 
-/* The context owns what a mesh holds, so the generator's arrays are copied into it. */
+/* The context owns the arrays of a mesh, so the generator's arrays are copied into it. */
 static int adopt(orb_context *ctx, const adversarial_mesh *from, orb_mesh *out) {
   size_t vertices = (size_t)from->vertex_count, triangles = (size_t)from->triangle_count;
   memset(out, 0, sizeof *out);

@@ -36,7 +36,7 @@ ORDER = [
     "client/web/src/main"]
 # server/http/regions.c defines these in place of libc's for libmicrohttpd; other callers mean libc's.
 IN_PLACE_OF_LIBC = {"sendmsg"}
-MOST_ENTRIES = {"core/align": 10}  # files and folders directly in a folder: its parts are seen at once
+MOST_ENTRIES = {"core/align": 10}  # the most files and folders directly in a folder, so that a reader sees its parts at once
 SOURCE = re.compile(r"\.(inc\.h|c|h|cc|hh)$")
 SCRIPT = re.compile(r"\.(d\.ts|tsx|ts|mjs|js)$")
 

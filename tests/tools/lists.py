@@ -18,7 +18,7 @@ SOURCES = {
     "alignment method": ("core/include/orbmorph/alignment.h", r"\bORB_ALIGN_(\w+)"),
     "remesh method": ("core/include/orbmorph/remesh_methods.h", r'METHOD\(\w+, \w+, "([\w-]+)"'),
 }
-# Measurements and history name what existed at their time.
+# Measurements and history name the formats and methods of their time.
 LEFT_OUT = re.compile(r"(^|/)(RESULTS\.md|CHANGELOG\.md)$|^docs/bench|\.(png|jpg|glb|gz|xz|zst|stl|obj|off|ply)$|package-lock|tools/lists\.py$")
 SEPARATOR = r"[^\w]{1,12}(?:(?:or|and)[^\w]{1,6})?"  # between two words of a list: punctuation, quotes, a line break
 

@@ -1,4 +1,5 @@
-// A client of S3 for tests, with signatures of its own: s3.mjs METHOD BUCKET[/KEY][?QUERY] on the server of with_s3.sh.
+// A client of S3 for tests that makes its own signatures: s3.mjs METHOD BUCKET[/KEY][?QUERY] on the server of
+// with_s3.sh.
 import { createHash, createHmac } from 'node:crypto';
 
 const sha256 = (bytes) => createHash('sha256').update(bytes).digest('hex');

@@ -72,9 +72,9 @@ async function end() {
 for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, end);
 
 try {
-  const urls = [await start(0)]; // it brings the schema up to date
+  const urls = [await start(0)]; // this one migrates the schema
   urls.push(...(await Promise.all([start(1), start(2)])));
-  // A single client asks here, without pauses; and tests read what haproxy hides from strangers.
+  // A single client sends requests here, without pauses; and tests read what haproxy hides from strangers.
   const text = configuration(urls, 'fd@3', 1024)
     .replace(/^ {4}(http-request return|tcp-request connection reject).*\n/gm, '')
     .replace('balance leastconn', 'balance roundrobin');

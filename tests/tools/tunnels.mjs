@@ -1,11 +1,12 @@
-// A mesh with tunnels: each joins the rims of two triangles that face apart on either side of a thin part.
+// A mesh with tunnels: each joins the rims of two triangles that face away from each other on both sides of a thin
+// part.
 
 const sub = (a, b) => a.map((x, k) => x - b[k]);
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => a.map((x) => x / Math.hypot(...a));
 
-/** `places`: points at which one begins. The genus of a closed mesh grows by one for each. */
+/** `places`: points at which a tunnel begins. Each adds one to the genus of a closed mesh. */
 export function tunnels({ positions, triangles }, places) {
   const corners = triangles.map((t) => t.map((v) => positions[v]));
   const middle = corners.map((c) => [0, 1, 2].map((k) => (c[0][k] + c[1][k] + c[2][k]) / 3));
