@@ -3,8 +3,8 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-/* Bytes of memory a byte of the file. FILE_BYTES: real files take up to 5.4 in the budget of the check, and its process
- * some more. A larger figure would let fewer checks run side by side. */
+/* Bytes of memory per byte of the file. FILE_BYTES: real files take up to 5.4 in the budget of the check, and its
+ * process takes some more. A larger figure would let fewer checks run side by side. */
 enum { FILE_BASE = 4 << 20, FILE_BYTES = 9, DENSEST_BYTES = 200 };
 
 struct memory_budget {

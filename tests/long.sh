@@ -94,9 +94,9 @@ part_migrate() {
   ORBMORPHD="$PWD/build/bin/orbmorphd" tests/tools/with_postgresql.sh tests/tools/with_s3.sh node tests/long/migrate.mjs
 }
 
-# The scenarios on three nodes behind haproxy, with PostgreSQL and S3: OpenStack Swift, then Ceph's radosgw where it can be
-# installed (ORB_S3_SERVERS names fewer). Those of jobs and tenants also with PostgreSQL and files. Then several nodes
-# which are killed, paused and cut off, by turns.
+# The scenarios on three nodes behind haproxy, with PostgreSQL and S3: OpenStack Swift, then Ceph's radosgw if it can be
+# installed (ORB_S3_SERVERS names fewer). The scenarios jobs and tenants also run with PostgreSQL and files. Then
+# several nodes which are killed, paused and cut off in turn.
 part_cluster() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
   cmake --build build --target orbmorphd orbmorph

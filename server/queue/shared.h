@@ -36,7 +36,7 @@ int shared_take(queue *q, queue_lane lane, job **out, int *threads);
 queue_result shared_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const char *const *requests,
                              const int64_t *costs, int count);
 
-/* Under the lock: there may be jobs to claim, also downloads if fetches; numbers over all nodes. */
+/* Called under the lock: there may be jobs to claim, including downloads if fetches. The numbers cover all nodes. */
 void shared_look(queue *q, int fetches);
 void shared_count(const queue *q, int64_t now, queue_numbers *out);
 /* This node claims nothing for this long. */

@@ -20,8 +20,8 @@ enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node or
 /* How long events and times of use wait for a write whose caller waits. Their own commit, with its fdatasync(), costs
  * more than all else that a small job writes. The end of such a job takes its events along. */
 enum { GATHER_MS = 20 };
-/* The same among several nodes, whose transactions wait for one another. Events of jobs on other nodes come that much
- * later. */
+/* The same if several nodes share the catalogue: their transactions wait for each other. Events reach other nodes later
+ * by up to this time. */
 enum { GATHER_SHARED_MS = 100 };
 
 /* A waiting write. catalogue_write() keeps it on its caller's stack. */

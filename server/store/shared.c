@@ -49,7 +49,8 @@ static const char pick_computing[] =
          FIRST("kind<>2") " UNION ALL " SMALLEST("kind<>2") " LIMIT 1");
 static const char pick_fetching[] = PICK("true", FIRST("kind=2"));
 
-/* Also of a job that was picked before the transaction: another node may have claimed it since, or one with its key. */
+/* Also takes a job that was picked before the transaction: another node may have claimed it since, or a job with its
+ * key. */
 static const char take[] =
     "UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(), alone=suspect,"
     " started=CASE WHEN started=0 AND kind<>1 THEN clock_ms() ELSE started END" /* 1: catalogue_job_begin() */
@@ -152,7 +153,7 @@ static int claim_next(database *db, void *arg) {
                         : code;
 }
 
-/* Picks outside of the transaction, for which all nodes wait. The query takes longer than all else in it. */
+/* Picks outside the transaction, for which all nodes wait. The query takes longer than the rest of the claim. */
 store_result catalogue_claim_next(catalogue *cat, const claim_wish *wish, job_claim *out) {
   claim_arg a = {.wish = wish, .out = out};
   memset(out, 0, sizeof *out);

@@ -46,8 +46,8 @@ static int execute(sql_connection *c, const char *sql) {
   return code_of(code);
 }
 
-/* What savepoints keep, pages of a few jobs, stays in memory: by default SQLite makes a file in /var/tmp of more than
- * 64 KiB, which takes longer than the write of a small job itself. */
+/* The pages that savepoints keep, those of a few jobs, stay in memory: by default SQLite writes more than 64 KiB to a
+ * file in /var/tmp, which takes longer than the write of a small job itself. */
 static void keep_savepoints_in_memory(void) {
   enum { SPILL_BYTES = 4 << 20 };
   sqlite3_config(SQLITE_CONFIG_STMTJRNL_SPILL, SPILL_BYTES);

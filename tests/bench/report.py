@@ -289,7 +289,7 @@ def scaling(bench, report, repeat, folder, quick):
         path.unlink()
     report.add("## Newton: scaling with size", f"{source.stem}, split four-way; default preset.")
     report.table(["triangles", "one thread, a minute", "two threads, a minute", "one thread by processor time",
-                  "peak bytes a triangle, one thread", "two threads"], rows)
+                  "peak bytes per triangle, one thread", "two threads"], rows)
     report.plot("size", "Rate against size", lines(
         [("one thread", [(m[0]["triangles"], m[0]["triangles_per_minute"] / 1e6) for m in measured]),
          ("two threads", [(m[1]["triangles"], m[1]["triangles_per_minute"] / 1e6) for m in measured])],
@@ -315,7 +315,7 @@ def scaling(bench, report, repeat, folder, quick):
     worst = max([m for pair in measured for m in pair] + shared, key=lambda m: m["peak_rss_bytes"] / m["triangles"])
     peak = worst["peak_rss_bytes"] / worst["triangles"]
     report.goal("peak memory of the process above 100,000 triangles, mesh, file and libraries included",
-                "250 bytes a triangle", f"{peak:.0f} ({worst['mesh']}, {worst['triangles']} triangles)", peak <= 250)
+                "250 bytes per triangle", f"{peak:.0f} ({worst['mesh']}, {worst['triangles']} triangles)", peak <= 250)
 
 
 def determinism(bench, report, folder):

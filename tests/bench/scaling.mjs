@@ -52,8 +52,8 @@ function held(name) {
   const group = path.join(first ? '/sys/fs/cgroup' : '/sys/fs/cgroup/cpu', name);
   mkdirSync(group);
   const quota = Math.round(share * PERIOD);
-  // A node that waited for a core in one period may have the rest of its share in the next: on average it gets no more.
-  // The weight is for machines that do other work besides: a node should get its share there as well.
+  // A node that waited for a core in one period may use the rest of its share in the next: on average it gets no more.
+  // The weight is for machines with other work: a node should get its share there as well.
   if (first) {
     writeFileSync(path.join(group, 'cpu.max'), `${quota} ${PERIOD}`);
     writeFileSync(path.join(group, 'cpu.max.burst'), `${quota}`);

@@ -2,8 +2,8 @@
 # Ceph's radosgw with its S3 API, on loopback: radosgw.sh FOLDER [PORT]
 #
 # The first start also starts a monitor and an OSD that keeps its objects in memory, writes their processes to
-# FOLDER/cluster, and makes the users of tests/tools/swift_s3.py. The script becomes radosgw, and prints its port once it
-# answers. A PORT that was printed before serves the same objects again, while monitor and OSD run.
+# FOLDER/cluster, and creates the users of tests/tools/swift_s3.py. The script becomes radosgw, and prints its port once it
+# answers. A PORT that was printed before serves the same objects again, as long as monitor and OSD run.
 set -eu
 folder=$1 port=${2:-}
 export CEPH_CONF=$folder/ceph.conf CEPH_ARGS=

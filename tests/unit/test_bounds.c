@@ -456,7 +456,8 @@ static double usual_seconds_a_byte(void) {
   return least;
 }
 
-/* What docs/limits.md states of ordinary files. The daemon reserves 9 bytes a byte for the first check. */
+/* The figures of docs/limits.md for ordinary files. The daemon reserves 9 bytes per byte of the file for the first
+ * check. */
 static void test_ordinary_memory(void **state) {
   (void)state;
   text ordinary = loose_triangles(16000, 0);
@@ -468,7 +469,7 @@ static void test_ordinary_memory(void **state) {
   orb_status repaired = orb_mesh_repair(own, &mesh, ORB_REPAIR_SAFE);
   (void)repaired;
   double peak = (double)orb_memory_peak(own) / (double)ordinary.size;
-  print_message("an ordinary file: %.1f bytes a byte\n", peak);
+  print_message("an ordinary file: %.1f bytes per byte\n", peak);
   assert_true(peak > 1 && peak <= 5.5);
   orb_mesh_free(own, &mesh);
   orb_context_destroy(own);

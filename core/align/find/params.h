@@ -80,9 +80,9 @@ static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0
 /* If a rough map takes the landmarks farther from their partners than this mean distance, it is another map. In radii
  * of a ball of the shape's area. */
 static const double ORB_FIND_HINT_OFF = 0.5;
-/* Nor is a map registered that takes them so many times as far as the best one, and farther than that distance. Of five
- * pairs of people, all maps that came near the partners had 0.16 to 0.5 before, the best one 0.16 to 0.3, and others up
- * to 3. */
+/* A rough map is not registered either if it maps the landmarks this many times as far from their partners as the best
+ * one, and farther than that distance. For five pairs of people, all maps that came near the partners started at 0.16
+ * to 0.5, the best one at 0.16 to 0.3, and others at up to 3. */
 static const double ORB_FIND_HINT_ROUGH = 2;
 
 /* If landmarks bend a pose more than this many times as much as it bends without them, they have twisted it. In 77

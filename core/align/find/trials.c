@@ -223,7 +223,7 @@ static void fill_costs(orb_trials *t, int directions) {
   }
 }
 
-/* How far a rough map takes the landmarks of copy s from their partners, in the mean. */
+/* The mean distance of the landmarks of copy s from their partners under a rough map. */
 static double rough_off(const orb_trials *t, const orb_trial *one, int s) {
   double sum = 0;
   for (int32_t i = 0; i < t->hint.few; i++) {
@@ -233,8 +233,8 @@ static double rough_off(const orb_trials *t, const orb_trial *one, int s) {
   return t->hint.few > 0 ? sum / t->hint.few : 0;
 }
 
-/* Drops the trials whose rough maps take the landmarks far from their partners both ways, compared with the best of
- * them: registering brings them nearer by less. */
+/* Drops the trials whose rough maps leave the landmarks far from their partners in both directions, compared with the
+ * best trial: a registration brings them nearer by less than that. */
 static void drop_far_from_hint(orb_trials *t) {
   double off[ORB_TRIALS_MAX], least = INFINITY;
   for (int32_t i = 0; i < t->count; i++) {

@@ -329,7 +329,7 @@ static orb_status measure_all(measure_job *job, orb_distortion *out) {
   }
   out->stretch_efficiency = source / stretch;
   ORB_TRY(orb_context_check(ctx));
-  /* To start threads takes longer than a summary of so few triangles. */
+  /* starting threads takes longer than a summary of so few triangles */
   enum { FEW = 16384 };
   orb_parallel_for(ctx, MEASURES, job->count < FEW ? MEASURES : 1, summarise_range, job);
   return (orb_status)atomic_load(&job->status);
