@@ -228,7 +228,7 @@ static int32_t list_landmarks(const orb_landmark *landmarks, const orb_alignment
   return exact;
 }
 
-/* What a match has led to before anything is pinned. */
+/* The result of a match before anything is pinned. */
 typedef struct posed {
   orb_alignment alignment; /* empty, unless it is found */
   double worst;            /* the largest energy of its maps */
@@ -242,7 +242,7 @@ static void posed_free(orb_context *ctx, posed *p) {
 }
 
 /* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
- * partners, with all of them pinned. Soft landmarks exclude matches only where too few are exact. sure: as of the hint.
+ * partners, with all of them pinned. Soft landmarks exclude matches only if too few are exact. sure: that of the hint.
  * Raises p->worst, to INFINITY if there is no such match, or no such map. */
 static orb_status compose_posed(orb_context *ctx, const orb_landmark *landmarks, int32_t s, orb_preset preset,
                                 double sure, int keeps_angles, posed *p) {
@@ -317,9 +317,9 @@ end:
 
 /* Aligns shapes that are one body in several poses. The map starts on spheres that keep angles, as without landmarks.
  * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
- * what lies between them. sure: as of orb_match_hint. Nothing is found if the landmarks do not show one body, if there
- * is no map, or if such a sphere has no room for a landmark: where the given one has, pins can meet. Free `out` in any
- * case. */
+ * the surface between them. sure: that of orb_match_hint. Nothing is found if the landmarks do not show one body, if
+ * there is no map, or if such a sphere has no room for a landmark; pins can meet if the given sphere has room. Free
+ * `out` in any case. */
 static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                               const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                               double sure, posed *out) {
@@ -354,7 +354,7 @@ static void keep_better(orb_context *ctx, orb_alignment *a, posed *p) {
 
 /* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a
  * match may lead to a better one, even if the landmarks show one body less clearly. All other starts are for shapes for
- * which neither works. p: what a match has led to before; if it was found, the better one is kept. */
+ * which neither works. p: the result of the match; if it was found, the better one is kept. */
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                           const orb_align_options *options, posed *p, orb_alignment *a) {
   const orb_map_params params = orb_map_params_of(options->preset);
@@ -379,7 +379,7 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const
   return ORB_OK;
 }
 
-/* Does a match make pins needless? Of more than two shapes, no walk competes with it. */
+/* Whether a match makes pins needless. With more than two shapes, no walk competes with it. */
 static int is_enough(const posed *p, int32_t shape_count, orb_preset preset) {
   const double most = shape_count > 2 ? ORB_FIND_POSED_POOR : orb_map_params_of(preset).energy.good;
   return p->is_found && preset != ORB_PRESET_QUALITY && p->worst <= most;

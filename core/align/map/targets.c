@@ -1,11 +1,11 @@
 /* Without landmarks, the targets are smoothed first, by a registration in space through samples of them, if the first
  * level then has fewer flips. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h)
- * clears the remaining flips. Where the targets are folded the map has crumpled, as in the pockets of a face and where
- * limbs touch. So it is ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples. If that
- * leads to no map of shapes that correspond, passes through samples of the best map follow. Then come two more starts,
- * until one is such a map: from the targets as given on a coarser level, and on the usual level from the targets that
- * the first start has not followed. Then passes and a draw bring the energy down. Passes come first: they find a better
- * basin, and a draw only the bottom of one. If no pass helps, the map is drawn to the given targets.
+ * clears the remaining flips. Where the targets are folded, the map is crumpled, for example in the pockets of a face
+ * and where limbs touch. So it is ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples.
+ * If that leads to no map of shapes that correspond, passes through samples of the best map follow. Then come two more
+ * starts, until one is such a map: from the targets as given on a coarser level, and on the usual level from the
+ * targets that the first start has not followed. Then passes and a draw bring the energy down. Passes come first: they
+ * find a better basin, and a draw only the bottom of one. If no pass helps, the map is drawn to the given targets.
  *
  * If none of these gives such a map, samples of the targets guide landmark walks (walked.h). A walk begins without
  * flips and is optimised on a coarse level, so several are tried, and the best one is refined. If the caller says so, a
