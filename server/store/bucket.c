@@ -13,6 +13,7 @@
 #include "api/sha256.h"
 #include "api/text.h"
 #include "log.h"
+#include "orbmorph/context.h"
 #include "store/s3_keys.h"
 #include "wake.h"
 
@@ -34,6 +35,7 @@ struct object_bucket {
   pthread_cond_t wake;
   pthread_t watcher;
   int watches, away, closing;
+  int64_t away_at; /* when it was last known to be unreachable, as orb_clock_ms(); 0: never. __atomic */
 };
 
 int bucket_hash(int fd, uint64_t from, uint64_t size, char out[65]) {
@@ -60,9 +62,16 @@ int bucket_is_away(object_bucket *b) {
   return __atomic_load_n(&b->away, __ATOMIC_ACQUIRE);
 }
 
+int bucket_was_away(object_bucket *b, int64_t since) {
+  return bucket_is_away(b) || __atomic_load_n(&b->away_at, __ATOMIC_ACQUIRE) >= since;
+}
+
 static void set_away(object_bucket *b, int away, const char *why) {
   pthread_mutex_lock(&b->lock);
   int changes = b->away != away;
+  if (changes || away) {
+    __atomic_store_n(&b->away_at, orb_clock_ms(), __ATOMIC_RELEASE);
+  }
   __atomic_store_n(&b->away, away, __ATOMIC_RELEASE);
   if (changes) {
     pthread_cond_signal(&b->wake);

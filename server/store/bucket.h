@@ -46,6 +46,8 @@ store_result bucket_each(object_bucket *b, void (*each)(void *user, const char *
 int bucket_link(object_bucket *b, const char *name, long seconds, const char *more, char out[BUCKET_LINK]);
 
 int bucket_is_away(object_bucket *b);
+/* Whether S3 was unreachable at some time since `since` (orb_clock_ms()). */
+int bucket_was_away(object_bucket *b, int64_t since);
 /* SHA-256 of a file's bytes, in hexadecimal digits. 0: it cannot be read. */
 int bucket_hash(int fd, uint64_t from, uint64_t size, char out[65]);
 

@@ -293,6 +293,10 @@ int objects_are_away(const objects *store) {
   return store->vault && vault_is_away(store->vault);
 }
 
+int objects_were_away(const objects *store, int64_t since) {
+  return store->vault && vault_was_away(store->vault, since);
+}
+
 int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
                  char out[BUCKET_LINK]) {
   char name[OBJECT_NAME];

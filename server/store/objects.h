@@ -75,6 +75,8 @@ int objects_is_near(const objects *store, object_kind kind, const char *id);
 /* Whether the objects are in a bucket, and whether the bucket fails to answer. */
 int objects_are_remote(const objects *store);
 int objects_are_away(const objects *store);
+/* Whether it has failed to answer at some time since `since` (orb_clock_ms()). */
+int objects_were_away(const objects *store, int64_t since);
 /* A URL from which anyone may read an object for so many seconds; more: see s3_presign(). 0: there is none. */
 int objects_link(const objects *store, object_kind kind, const char *id, long seconds, const char *more,
                  char out[BUCKET_LINK]);

@@ -294,6 +294,10 @@ int vault_is_away(vault *v) {
   return bucket_is_away(v->bucket);
 }
 
+int vault_was_away(vault *v, int64_t since) {
+  return bucket_was_away(v->bucket, since);
+}
+
 int vault_link(vault *v, const char *name, long seconds, const char *more, char out[BUCKET_LINK]) {
   return bucket_link(v->bucket, name, seconds, more, out);
 }

@@ -42,6 +42,7 @@ int vault_take_damaged(vault *v, char name[VAULT_NAME]);
 store_result vault_drop_damaged(vault *v, const char *name, int64_t signed_at);
 
 int vault_is_away(vault *v);
+int vault_was_away(vault *v, int64_t since);
 int vault_link(vault *v, const char *name, long seconds, const char *more, char out[BUCKET_LINK]);
 
 #endif

@@ -174,7 +174,7 @@ static const char *why_failed(orb_context *ctx, const api_problem *problem) {
 
 /* Whether a job that ran since `began` may have failed because a store was unreachable. */
 static int may_be_store(const run_env *env, int64_t began) {
-  return objects_are_away(env->store) || catalogue_was_away(env->cat, began);
+  return objects_were_away(env->store, began) || catalogue_was_away(env->cat, began);
 }
 
 static void fetch_one(worker_pool *pool, job *j, job_spans *spans) {

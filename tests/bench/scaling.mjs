@@ -6,8 +6,11 @@
 //
 // All nodes are on this machine, so a cgroup holds each that works to a share of a core, ORB_SHARE (0.4), as `CPUQuota` of systemd
 // does; this takes root and a cgroup file system. That says something only if the cores are not busy otherwise; the column "got" is
-// what the nodes really had, and says whether they waited for the database and S3 instead. ORB_JOBS (200) embeddings of
-// 20,480 triangles, a quarter of them for each ORB_LEVEL below 5, for each number of nodes, ORB_NODES (1,2,4). ORBMORPHD names the daemon.
+// what the nodes really had, and says whether they waited for the database and S3 instead. ORB_KIND is what is asked ORB_JOBS (200)
+// times for each number of nodes, ORB_NODES (1,2,4): "embedding" (the default) of 20,480 triangles, "morph" of two embedded
+// shapes of 1,280 each, or "rotate", the same with align.method rotate. Each ORB_LEVEL less than 5 (3 for morphs) has a quarter of these
+// triangles. ORBMORPHD names the daemon. Beside other work, `chrt -f 1` before the command gives the stores their time first; the
+// nodes that are measured drop that priority.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, writeFileSync } from 'node:fs';
@@ -24,7 +27,8 @@ assert.ok(
 );
 const share = Number(process.env.ORB_SHARE ?? 0.4);
 const jobs = Number(process.env.ORB_JOBS ?? 200);
-const level = Number(process.env.ORB_LEVEL ?? 5);
+const kind = process.env.ORB_KIND ?? 'embedding';
+const level = Number(process.env.ORB_LEVEL ?? (kind === 'embedding' ? 5 : 3));
 const counts = (process.env.ORB_NODES ?? '1,2,4').split(',').map(Number);
 const PERIOD = 10_000; // µs; a longer one would pause a node within its requests to the database, where others wait for it
 const GOALS = new Map([
@@ -100,6 +104,33 @@ function postmaster(catalogue) {
   return Number(readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ')[1]);
 }
 
+const upload = async (node, i) => {
+  const bump = ([x, y, z]) => [x * (1 + 0.3 * Math.sin(i)), y, z + 0.0001 * i];
+  return (await node.upload(shapes.obj(shapes.ball(level, bump)))).json.id;
+};
+
+/** Asks for the jobs, each for something else. */
+async function ask(serve, start) {
+  const accepted = async (target, body) => assert.equal((await serve.post(target, body)).status, 202);
+  if (kind === 'embedding') {
+    for (let i = 0; i < jobs; i++) await accepted('/v1/embeddings', { mesh: await upload(serve, i) });
+    return;
+  }
+  const helper = await start([], '--role', 'work');
+  const meshes = [];
+  while ((meshes.length * (meshes.length - 1)) / 2 < jobs) {
+    meshes.push(await upload(serve, meshes.length));
+    await serve.made('/v1/embeddings', { mesh: meshes.at(-1) });
+  }
+  await helper.stop();
+  const pairs = meshes.flatMap((one, i) => meshes.slice(0, i).map((other) => [one, other]));
+  for (const pair of pairs.slice(0, jobs))
+    await accepted('/v1/supermeshes', {
+      shapes: pair.map((mesh) => ({ mesh })),
+      ...(kind === 'rotate' ? { align: { method: 'rotate' } } : {}),
+    });
+}
+
 async function measure(count) {
   const name = `scaling${process.pid}-${count}`;
   const catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
@@ -115,24 +146,24 @@ async function measure(count) {
   const groups = [];
   try {
     const serve = await start([], '--role', 'serve');
-    for (let i = 0; i < jobs; i++) {
-      const bump = ([x, y, z]) => [x * (1 + 0.3 * Math.sin(i)), y, z + 0.0001 * i];
-      const mesh = (await serve.upload(shapes.obj(shapes.ball(level, bump)))).json;
-      assert.equal((await serve.post('/v1/embeddings', { mesh: mesh.id })).status, 202);
-    }
+    await ask(serve, start);
     const before = cost(catalogue);
     const server = postmaster(catalogue);
     const spent = cpu(server);
     const works = [];
     for (let i = 0; i < count; i++) {
       groups.push(held(`orbmorph-${name}-${i}`));
-      const enter = ['/bin/sh', '-c', `echo $$ >${groups[i].processes} && exec "$0" "$@"`];
+      const enter = ['chrt', '-o', '0', '/bin/sh', '-c', `echo $$ >${groups[i].processes} && exec "$0" "$@"`];
       works.push(await start(enter, '--role', 'work', '--workers', '1'));
     }
     const roots = works.map(({ child }) => child.pid);
     const had = roots.map(cpu);
     // The database knows when the last job ended: asking it more often would take time from the nodes.
-    const ended = () => sql(catalogue, 'SELECT count(*), max(finished) FROM job WHERE state=2 /* bench */').split('|');
+    const ended = () =>
+      sql(
+        catalogue,
+        `SELECT count(*), max(finished) FROM job WHERE state=2 AND kind=${kind === 'embedding' ? 0 : 1} /* bench */`,
+      ).split('|');
     const began = Date.now();
     const first = Number(ended()[0]);
     while (Number(ended()[0]) < jobs) await new Promise((done) => setTimeout(done, 1000));
@@ -142,7 +173,7 @@ async function measure(count) {
     return { rate: (1000 * (jobs - first)) / (Number(ended()[1]) - began), got, each };
   } finally {
     for (const node of nodes) {
-      await node.stop();
+      if (node.child) await node.stop();
       await rm(node.data, { recursive: true, force: true });
     }
     for (const { remove } of groups) remove();

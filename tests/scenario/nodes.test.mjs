@@ -216,6 +216,33 @@ async function behindHaproxy(t, [a, b]) {
   assert.equal((await p.get(`/v1/embeddings/${made.id}/sphere.ply`)).status, 200);
 }
 
+test('what a client may ask holds over all nodes together', { skip: lacksHaproxy }, async (t) => {
+  const c = new Cluster(t);
+  const nodes = [await c.node('--role', 'serve'), await c.node('--role', 'serve')];
+  const p = await haproxy(
+    t,
+    nodes.map(({ url }) => url),
+  );
+  const served = async (node) => {
+    const { bytes } = await node.get('/metrics');
+    return Number(/^orbmorph_http_responses_total\{class="2xx"\} (\d+)/m.exec(bytes.toString())[1]);
+  };
+  const count = { 200: 0, 429: 0 };
+  const began = Date.now();
+  while (Date.now() - began < 8000 && !count[429]) {
+    const replies = await Promise.all(Array.from({ length: 20 }, () => p.get('/livez')));
+    for (const { status } of replies) count[status]++;
+  }
+  // 1,000 in ten seconds. A machine that is too slow to ask so often tells nothing.
+  if (!count[429]) return t.skip(`${count[200]} requests in 8 s`);
+  assert.ok(count[200] > 900 && count[200] <= 1000, `${count[200]} requests were served`);
+  const each = await Promise.all(nodes.map(served));
+  assert.ok(
+    each.every((n) => n > 100),
+    `${each}`,
+  );
+});
+
 test('any node cancels a job; a node that is killed loses its jobs to others', async (t) => {
   const c = new Cluster(t);
   const a = await c.node('--role', 'serve');

@@ -10,6 +10,7 @@ import test from 'node:test';
 import { list, s3 } from '../tools/s3.mjs';
 import { runProgram } from './support/cli.mjs';
 import { assertProblem, Daemon, daemon, root, samples, until } from './support/daemon.mjs';
+import { workers } from './support/processes.mjs';
 import { busy, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
 import { tetrahedron } from './support/shapes.mjs';
 
@@ -291,6 +292,30 @@ test('each request that fails is tried again: 503, lost answers, half a body, wr
     assert.ok(await keyOf('troubled', 'mesh', id));
   }
   assert.ok(!existsSync(path.join(d.data, 'quarantine')));
+});
+
+test('a job that could not read its input runs again, also if S3 is back before it has failed', async (t) => {
+  const { d, empty, proxy } = await troubled(t, 'back', () => undefined);
+  const shapes = [];
+  for (const name of ['dog.obj', 'giraffe.off']) shapes.push({ mesh: (await d.mesh(path.join(samples, name))).id });
+  for (const { mesh } of shapes) await d.made('/v1/embeddings', { mesh });
+  await empty();
+  await until(() => workers(d).length === 0, 'the processes that checked the files end', 20);
+  let stopped;
+  let fails = 4; // as often as the daemon tries
+  proxy.decide = ({ method, path: at }) => {
+    if (method !== 'GET' || !/sphere/.test(at) || !fails) return;
+    fails--;
+    if (!stopped) [stopped] = workers(d);
+    process.kill(stopped, 'SIGSTOP'); // so that it ends after S3 is back
+    return busy;
+  };
+  const job = (await d.post('/v1/supermeshes', { shapes, align: { method: 'rotate' } })).json;
+  await until(() => /S3 is back/.test(d.log), 'S3 is back', 60);
+  assert.equal(fails, 0);
+  process.kill(stopped, 'SIGCONT');
+  const done = await d.ended(job);
+  assert.equal(done.state, 'succeeded', JSON.stringify(done.problem));
 });
 
 test('a large object goes in parts, each tried again, and is put together once', async (t) => {
