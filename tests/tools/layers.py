@@ -23,7 +23,7 @@ ORDER = [
     "core/include/orbmorph", "core/base", "core/numeric", "core/mesh", "core/format", "core/embed/common",
     "core/embed/newton/vector", "core/embed/newton", "core/embed/kernel_sampling", "core/embed", "core/sphere",
     "core/spectral", "core/elastic", "core/align/sheet", "core/align/rotate", "core/align/pin", "core/align/rbf", "core/align/map/engine",
-    "core/align/map/starts", "core/align/map/twist", "core/align/map",
+    "core/align/map/starts", "core/align/map/twist", "core/align/map", "core/align/map/rims",
     "core/align/find", "core/align",
     "core/remesh/common", "core/remesh/overlay", "core/remesh/placed", "core/remesh/adaptive", "core/remesh",
     "core/transfer", "core/carry", "core/profile", "core/merge", "api",
