@@ -32,7 +32,6 @@
 enum {
   MAP_ROUNDS = 2,    /* along the rough map alone; 8 change little */
   PLACE_ROUNDS = 6,  /* to the nearest places; 10 rank maps no better, and let wrong ones catch up */
-  SETTLE_ROUNDS = 3, /* of a pose that is near already; 6 come no nearer to the truth */
   SLIDE_ROUNDS = 10, /* 15 come nearer to the truth by a fiftieth */
   TURNS = 2,         /* of rotations and positions in a round */
   SURROUNDINGS = 4, /* a vertex takes its first rotation from the images of its surroundings, one vertex in this many of
@@ -432,11 +431,11 @@ end:
 }
 
 orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                              const orb_elastic_anchors *anchors, orb_elastic_pose *pose) {
+                              const orb_elastic_anchors *anchors, int rounds, orb_elastic_pose *pose) {
   registration r = {.ctx = ctx, .anchors = anchors, .pose = pose, .is_alone = 1};
   orb_status status;
   ORB_GO(status, registration_create(ctx, a, b, &r), end);
-  status = follow_places(&r, SETTLE_ROUNDS, SETTLE_FIRST_REACH, SETTLE_LAST_REACH);
+  status = follow_places(&r, rounds, SETTLE_FIRST_REACH, SETTLE_LAST_REACH);
 end:
   registration_free(&r);
   return status;

@@ -53,10 +53,10 @@ ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh 
                                                const orb_rough_map *map, const orb_elastic_anchors *anchors,
                                                orb_elastic_pose *pose, double *bend);
 
-/* Moves mesh a to the nearest places of mesh b, and its anchors to theirs, from a pose near them. Changes the pose. On
- * all threads. */
+/* Moves mesh a to the nearest places of mesh b, and its anchors to theirs, from a pose near them, in so many rounds, at
+ * least 2. Changes the pose. On all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                                             const orb_elastic_anchors *anchors, orb_elastic_pose *pose);
+                                             const orb_elastic_anchors *anchors, int rounds, orb_elastic_pose *pose);
 
 /* Slides mesh a over mesh b until the two fit each other in space, from where a map takes its vertices. A map of little
  * energy knows lengths only; a slide knows bumps and hollows as well. Both meshes are as in orb_elastic_register().

@@ -123,7 +123,8 @@ static orb_status write_targets(const orb_trials *t, orb_trial *one, double **ta
          end);
   ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, &fine[1].mesh, &anchors), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};
-  ORB_GO(status, orb_elastic_settle(t->ctx, &fine[1].mesh, &fine[0].mesh, &held, &pose), end);
+  const int rounds = (one->bend[0] + one->bend[1]) / 2 > ORB_FIND_WALKS_FIRST ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
+  ORB_GO(status, orb_elastic_settle(t->ctx, &fine[1].mesh, &fine[0].mesh, &held, rounds, &pose), end);
   for (size_t i = 0; i < count; i++) {
     points[i] = (t->mesh[1]->positions[i] - t->scaling[1].middle[i % 3]) * t->scaling[1].scale;
   }
