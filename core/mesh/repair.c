@@ -18,6 +18,7 @@
 #include "mesh/refuse.h"
 #include "mesh/split.h"
 #include "mesh/weld.h"
+#include "numeric/vec3.h"
 
 static int is_safe(unsigned repair) {
   return repair != ORB_REPAIR_NONE;
@@ -154,12 +155,28 @@ static orb_status make_consistent(orb_surface *s, unsigned repair, unsigned char
   return orb_surface_rematch(s);
 }
 
-/* Faces the mesh outward, by its signed volume. reversed: from make_consistent(), or NULL. old: the faces it covers;
- * the others fill holes. */
+/* Where what fills holes has at least this share of the area, the mesh is a sheet: its two sides are as good, so it
+ * faces as its file does. The volume of a flat one is only rounding, and a bowl may be seen from inside. */
+static const double SHEET = 0.25;
+
+static int is_sheet(const orb_mesh *mesh, int32_t old, double area) {
+  double fills = 0;
+  for (int32_t t = old; t < mesh->triangle_count; t++) {
+    const int32_t *v = mesh->triangles + 3 * (size_t)t;
+    if (mesh->source_triangle[t] == ORB_MADE_FILL) {
+      fills += orb_triangle_area(mesh->positions + 3 * (size_t)v[0], mesh->positions + 3 * (size_t)v[1],
+                                 mesh->positions + 3 * (size_t)v[2]);
+    }
+  }
+  return fills >= SHEET * area;
+}
+
+/* Faces the mesh outward, by its signed volume, unless it is a sheet. reversed: from make_consistent(), or NULL. old:
+ * the faces it covers; the others fill holes. */
 static void face_outward(orb_mesh *mesh, const unsigned char *reversed, int32_t old) {
   orb_extent extent;
   orb_mesh_extent(mesh, &extent);
-  int inside_out = extent.volume < 0;
+  int inside_out = extent.volume < 0 && !is_sheet(mesh, old, extent.area);
   if (inside_out) {
     for (int32_t t = 0; t < mesh->triangle_count; t++) {
       orb_mesh_reverse_face(mesh, t);

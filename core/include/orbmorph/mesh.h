@@ -133,10 +133,11 @@ enum {
 };
 
 /* Prepares a mesh for embedding, in place, or reports why it cannot be embedded. Afterwards it is closed, manifold,
- * oriented outward, connected, of genus zero, has four triangles or more, and a size and position that float32 can hold
- * (otherwise ORB_E_DEGENERATE, see ORB_DIAGONAL_MIN). With ORB_REPAIR_NONE the only change is to reverse a
- * mesh that is wholly inside out. On failure the contents of the mesh are unspecified but can be freed, and the error
- * has the facts (edges and vertices in the file's numbers). O(V + F) expected. */
+ * oriented outward, or as its file is where what fills holes has a quarter of its area, connected, of genus zero, has
+ * four triangles or more, and a size and position that float32 can hold (otherwise ORB_E_DEGENERATE, see
+ * ORB_DIAGONAL_MIN). With ORB_REPAIR_NONE the only change is to reverse a mesh that is wholly inside out. On failure
+ * the contents of the mesh are unspecified but can be freed, and the error has the facts (edges and vertices in the
+ * file's numbers). O(V + F) expected. */
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);
 
 #define ORB_HANDLE_SIZE 0.05
