@@ -22,6 +22,10 @@ void orb_map_surface_free(orb_context *ctx, orb_map_surface *b) {
   memset(b, 0, sizeof *b);
 }
 
+/* A weighted sum of normals, by radians, that is only rounding: the vertex is on the edge of a sheet that is folded
+ * onto itself, and has no normal. */
+static const double FOLDED = 1e-6;
+
 void orb_map_normals(const double *x, int32_t vertex_count, const int32_t *triangles, int32_t triangle_count,
                      double *out) {
   memset(out, 0, 3 * (size_t)vertex_count * sizeof *out);
@@ -39,7 +43,9 @@ void orb_map_normals(const double *x, int32_t vertex_count, const int32_t *trian
     }
   }
   for (int32_t v = 0; v < vertex_count; v++) {
-    orb_normalize(out + 3 * (size_t)v);
+    if (!(orb_normalize(out + 3 * (size_t)v) > FOLDED)) {
+      memset(out + 3 * (size_t)v, 0, 3 * sizeof *out);
+    }
   }
 }
 
