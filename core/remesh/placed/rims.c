@@ -1,6 +1,7 @@
 #include "remesh/placed/rims.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -23,6 +24,8 @@ enum { ROUNDS = 24 }; /* of splits; each halves the edges that deviate, so a few
 /* A vertex this near to the opposite edge of its triangle makes a needle, across which nothing can be traced. The edge
  * is flipped. */
 static const double FLAT = 1e-7;
+
+enum { NEEDLES = 8 }; /* around one vertex, which are flipped; a guard */
 
 typedef struct rims {
   orb_context *ctx;
@@ -77,6 +80,20 @@ static int can_move(const rims *r, int32_t v) {
   return v < r->old_count && !r->fixed[v];
 }
 
+/* Moves a vertex of the triangle at p there, if one is nearer than `reach` and may move. Rims lie where the surface has
+ * edges on both shapes, so the method often has a vertex beside one. −1: none. */
+static int32_t take_near(rims *r, const double p[3], double reach, int32_t *near) {
+  const orb_sphere_view view = orb_net_view(&r->net);
+  *near = orb_walk(&view, p, *near).triangle;
+  for (int k = 0; k < 3; k++) {
+    const int32_t v = r->net.triangles[3 * (int64_t)*near + k];
+    if (can_move(r, v) && orb_distance2(orb_net_point(&r->net, v), p) < reach * reach && orb_net_move(&r->net, v, p)) {
+      return v;
+    }
+  }
+  return -1;
+}
+
 static orb_status insert_vertices(rims *r) {
   const orb_aligned_shape *shape = &r->job->shapes[0];
   int32_t near = 0;
@@ -85,10 +102,14 @@ static orb_status insert_vertices(rims *r) {
     if (!is_rim(r->job, h)) {
       continue;
     }
+    const double length = sqrt(orb_distance2(shape->points + 3 * (int64_t)a, shape->points + 3 * (int64_t)b));
     for (int end = 0; end < 2; end++) {
       int32_t at = end ? b : a;
       if (r->vertex_of[at] < 0) {
-        int32_t v = r->vertex_of[at] = orb_net_insert(&r->net, shape->points + 3 * (int64_t)at, &near);
+        const double *p = shape->points + 3 * (int64_t)at;
+        int32_t v = take_near(r, p, NEAR * length, &near);
+        v = v >= 0 ? v : orb_net_insert(&r->net, p, &near);
+        r->vertex_of[at] = v;
         if (v < r->old_count) {
           r->fixed[v] = 1;
         }
@@ -96,6 +117,48 @@ static orb_status insert_vertices(rims *r) {
     }
   }
   return orb_context_check(r->ctx);
+}
+
+/* The distance of p from the great circle through a and b. */
+static double off_circle(const double p[3], const double a[3], const double b[3]) {
+  double n[3];
+  orb_cross(a, b, n);
+  orb_normalize(n);
+  return fabs(orb_dot(n, p));
+}
+
+/* May the edge of h be flipped? Several points of a straight edge lie on one arc but for rounding, so that the
+ * triangles between them are positive, but not clearly. */
+static int can_flip(const orb_net *net, int32_t h) {
+  const int32_t g = net->twin[h], c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
+  const double *a = orb_net_point(net, net->triangles[h]), *b = orb_net_point(net, net->triangles[g]);
+  return orb_net_can_flip(net, h) ||
+         (c != d && orb_orient(orb_net_point(net, c), orb_net_point(net, d), b) > 0 &&
+          orb_orient(orb_net_point(net, d), orb_net_point(net, c), a) > 0 && orb_net_edge(net, c, d) < 0);
+}
+
+/* Flips the edges on which rim vertices lie but for rounding. Such a needle is flat on the sphere, but where the rim of
+ * another shape has a corner, it is not flat there. */
+static void flip_needles(rims *r) {
+  orb_net *net = &r->net;
+  const int32_t vertices = r->job->shapes[0].mesh.vertex_count;
+  for (int32_t i = 0; i < vertices; i++) {
+    const int32_t v = r->vertex_of[i];
+    for (int flips = 0, flipped = v >= 0; flipped && flips < NEEDLES; flips++) {
+      int32_t first = net->out[v], h = first;
+      flipped = 0;
+      do {
+        const int32_t across = orb_next(h);
+        const double *p = orb_net_point(net, net->triangles[across]);
+        const double *q = orb_net_point(net, net->triangles[orb_next(across)]);
+        if (off_circle(orb_net_point(net, v), p, q) < FLAT && can_flip(net, across)) {
+          orb_net_flip(net, across);
+          flipped = 1;
+        }
+        h = net->twin[orb_prev(h)];
+      } while (h != first && !flipped);
+    }
+  }
 }
 
 /* Where the arcs from v to w and from p to q meet. */
@@ -113,6 +176,30 @@ static void meet(const double v[3], const double w[3], const double p[3], const 
     }
   }
   orb_normalize(out);
+}
+
+/* A vertex of the crossed edge that lies on the arc but for rounding, and nearer than w, moves onto it: where the two
+ * are parallel, they meet anywhere. −1: there is none. */
+static int32_t straighten(rims *r, const int32_t ends[2], const double *from, const double *to) {
+  double n[3];
+  orb_cross(from, to, n);
+  orb_normalize(n);
+  for (int k = 0; k < 2; k++) {
+    const double *p = orb_net_point(&r->net, ends[k]), off = orb_dot(n, p);
+    double on[3];
+    if (fabs(off) >= FLAT || !can_move(r, ends[k]) || orb_dot(p, to) < orb_dot(from, to)) {
+      continue;
+    }
+    for (int c = 0; c < 3; c++) {
+      on[c] = p[c] - off * n[c];
+    }
+    orb_normalize(on);
+    if (orb_net_move(&r->net, ends[k], on)) {
+      r->fixed[ends[k]] = 1;
+      return ends[k];
+    }
+  }
+  return -1;
 }
 
 /* The vertex at which the arc to w leaves the star of v: one on the arc, or one made where the arc crosses the star's
@@ -136,6 +223,14 @@ static int32_t step(rims *r, int32_t v, int32_t w) {
     return -1;
   }
   int32_t ends[2] = {net->triangles[crossed], net->triangles[orb_next(crossed)]};
+  if (off_circle(from, orb_net_point(net, ends[0]), orb_net_point(net, ends[1])) < FLAT && can_flip(net, crossed)) {
+    orb_net_flip(net, crossed);
+    return v;
+  }
+  const int32_t straight = straighten(r, ends, from, to);
+  if (straight >= 0) {
+    return straight;
+  }
   double x[3], length = sqrt(orb_distance2(orb_net_point(net, ends[0]), orb_net_point(net, ends[1])));
   meet(from, to, orb_net_point(net, ends[0]), orb_net_point(net, ends[1]), x);
   for (int k = 0; k < 2; k++) {
@@ -147,10 +242,6 @@ static int32_t step(rims *r, int32_t v, int32_t w) {
       r->fixed[ends[k]] = 1;
       return ends[k];
     }
-  }
-  if (orb_distance2(from, x) < FLAT * FLAT && orb_net_can_flip(net, crossed)) {
-    orb_net_flip(net, crossed);
-    return v;
   }
   return orb_net_split_edge(net, crossed, x);
 }
@@ -232,6 +323,9 @@ static orb_status place(rims *r, int keeps_tolerance, double *bound, orb_placed_
   }
   ORB_TRY(orb_placed_bounds(r->ctx, placed, bound));
   r->failed = keeps_tolerance && !is_within(r->job, bound);
+  fprintf(stderr, "place: changes %ld failed %d tris %d bounds %g %g tol %g\n", (long)changes, r->failed,
+          placed->net.triangle_count, bound[0] / r->job->diagonal[0], bound[1] / r->job->diagonal[1],
+          r->job->options->tolerance);
   return ORB_OK;
 }
 
@@ -278,7 +372,9 @@ orb_status orb_rims_add(orb_context *ctx, const orb_remesh_job *job, orb_superme
          done);
   fix_vertices(&r);
   ORB_GO(status, insert_vertices(&r), done);
+  flip_needles(&r);
   ORB_GO(status, trace_all(&r), done);
+  fprintf(stderr, "traced: failed %d of %ld tris %d\n", r.failed, (long)count, r.net.triangle_count);
   status = r.failed ? ORB_OK : replace(&r, out);
 done:
   orb_net_free(ctx, &r.net);
