@@ -318,6 +318,31 @@ static void write_dropped(const orb_merge_result *result, api_text *out) {
   api_json_close(out, ']');
 }
 
+/* Rims that lie on each other; nothing where there are none. */
+static void write_rims(const orb_alignment *alignment, api_text *out) {
+  if (alignment->rim_count == 0) {
+    return;
+  }
+  api_json_key(out, "rims");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < alignment->rim_count; i++) {
+    const orb_rim_match *one = &alignment->rims[i];
+    api_json_open(out, '{');
+    api_json_member_integer(out, "shape", one->shape);
+    for (int k = 0; k < 2; k++) {
+      api_json_key(out, k == 0 ? "base" : "other");
+      api_json_open(out, '{');
+      api_json_member_integer(out, "hole", one->hole[k] + 1);
+      api_json_member_integer(out, "edges", one->edges[k]);
+      api_json_member_number(out, "length_relative", one->length_relative[k]);
+      api_json_close(out, '}');
+    }
+    api_json_member_number(out, "off_relative", one->off_relative);
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+}
+
 static void write_timings(const orb_merge_timings *t, double embed_ms, api_text *out) {
   api_json_key(out, "timings_ms");
   api_json_open(out, '{');
@@ -384,6 +409,7 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   write_warnings(result, out);
   api_json_member_number(out, "energy", result->alignment.energy);
   write_dropped(result, out);
+  write_rims(&result->alignment, out);
   if (request->carry_count > 0) {
     api_json_key(out, "transferred");
     api_transferred_write(result->carried, result->carried_count, out);

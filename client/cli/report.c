@@ -10,6 +10,9 @@
 #include "text.h"
 #include "warnings.h"
 
+/* Rims no farther apart lie on each other but for rounding, relative to the diagonal. */
+static const double RIM_EXACT = 1e-6;
+
 static const cJSON *member(const cJSON *object, const char *name) {
   return cJSON_GetObjectItemCaseSensitive(object, name);
 }
@@ -113,6 +116,31 @@ static void print_fits(const cJSON *supermesh) {
   }
 }
 
+/* "rim of hole 1 to rim of hole 1 (48 and 52 edges), at most 0.1 % of the diagonal apart" */
+static void write_rim(FILE *out, const cJSON *rim) {
+  char off[32];
+  percent(cli_number(rim, "off_relative"), off);
+  fprintf(out, "rim of hole %.0f to rim of hole %.0f (%.0f and %.0f edges), ", cli_number(member(rim, "base"), "hole"),
+          cli_number(member(rim, "other"), "hole"), cli_number(member(rim, "base"), "edges"),
+          cli_number(member(rim, "other"), "edges"));
+  if (cli_number(rim, "off_relative") < RIM_EXACT) {
+    fputs("exact", out);
+  } else {
+    fprintf(out, "at most %s of the diagonal apart", off);
+  }
+}
+
+/* A line for each pair of rims that lie on each other. */
+static void print_rims(const cJSON *supermesh) {
+  const cJSON *rim;
+  cJSON_ArrayForEach(rim, member(supermesh, "rims")) {
+    const cJSON *shape = cJSON_GetArrayItem(member(supermesh, "shapes"), (int)cli_number(rim, "shape"));
+    printf("  %-16s ", cli_string(shape, "name", "?"));
+    write_rim(stdout, rim);
+    putchar('\n');
+  }
+}
+
 void cli_print_supermesh(const cJSON *supermesh) {
   char vertices[32], triangles[32], error[32], rms[32];
   const cJSON *shape, *certificate = member(supermesh, "certificate");
@@ -128,6 +156,7 @@ void cli_print_supermesh(const cJSON *supermesh) {
            rms);
   }
   print_fits(supermesh);
+  print_rims(supermesh);
   if (landmarks && were_found(supermesh)) {
     printf("  %d landmarks found; 'orbmorph get %s --json' prints them\n", landmarks,
            cli_string(supermesh, "url", "?"));
@@ -174,6 +203,22 @@ static void markdown_dropped(FILE *out, const cJSON *supermesh) {
     fputs(" | ", out);
     markdown_text(out, cli_string(entry, "where", ""));
     fprintf(out, " | %s |\n", cli_string(entry, "why", ""));
+  }
+}
+
+static void markdown_rims(FILE *out, const cJSON *supermesh) {
+  const cJSON *rim, *list = member(supermesh, "rims");
+  if (!cJSON_GetArraySize(list)) {
+    return;
+  }
+  fputs("\n## Holes that correspond\n\n", out);
+  cJSON_ArrayForEach(rim, list) {
+    const cJSON *shape = cJSON_GetArrayItem(member(supermesh, "shapes"), (int)cli_number(rim, "shape"));
+    fputs("* ", out);
+    markdown_text(out, cli_string(shape, "name", "?"));
+    fputs(": ", out);
+    write_rim(out, rim);
+    fputs("\n", out);
   }
 }
 
@@ -259,6 +304,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
       fputs(" |\n", out);
     }
   }
+  markdown_rims(out, supermesh);
   markdown_dropped(out, supermesh);
   fputs("\n## Time\n", out);
   markdown_numbers(out, "Milliseconds", member(supermesh, "timings_ms"));

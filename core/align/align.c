@@ -9,9 +9,13 @@
 #include "align/find/suspects.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
+#include "align/rims/alone.h"
+#include "align/rims/rims.h"
 #include "base/check.h"
 #include "base/context.h"
 #include "base/error.h"
+#include "base/memory.h"
+#include "orbmorph/transfer.h"
 
 void orb_align_defaults(orb_align_options *options) {
   memset(options, 0, sizeof *options);
@@ -123,7 +127,75 @@ static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, cons
   } else {
     memset(&out->match, 0, sizeof out->match);
   }
-  return orb_align_find(ctx, out, clear);
+  ORB_TRY(orb_align_find(ctx, out, clear));
+  for (int32_t i = 0; out->rim_count > 0 && i < out->found_count * out->shape_count; i++) {
+    const orb_place on_aligned = out->found[i];
+    const int32_t s = i % out->shape_count;
+    orb_place_before(shapes[s].mesh, &out->shapes[s], &on_aligned, &out->found[i]);
+  }
+  return ORB_OK;
+}
+
+/* Pins the only rims of two shapes that the search has not brought together, and composes the map from there: a disc is
+ * as good a match for the back of another one as for its front. *other is empty where that gives no map. */
+static orb_status align_at_rims(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
+                                orb_alignment *other) {
+  orb_align_options pin = *options;
+  orb_landmark landmarks[ORB_RIMS_ALONE] = {0};
+  orb_place at[2 * ORB_RIMS_ALONE];
+  int found;
+  memset(other, 0, sizeof *other);
+  ORB_TRY(orb_rims_alone(ctx, shapes, at, &found));
+  if (!found) {
+    return ORB_OK;
+  }
+  for (int32_t l = 0; l < ORB_RIMS_ALONE; l++) {
+    landmarks[l].at = at + 2 * l;
+    landmarks[l].weight = 1;
+  }
+  pin.method = ORB_ALIGN_PIN;
+  const orb_status status = orb_align_given(ctx, shapes, 2, landmarks, ORB_RIMS_ALONE, &pin, other);
+  if (is_of_copy(status)) {
+    orb_error_clear(ctx);
+    return ORB_OK;
+  }
+  ORB_TRY(status);
+  other->landmark_count = 0;
+  for (int32_t s = 0; s < 2; s++) {
+    orb_free(ctx, other->shapes[s].landmark_vertices);
+    other->shapes[s].landmark_vertices = NULL;
+  }
+  return orb_align_rims(ctx, options, other);
+}
+
+/* Takes such an alignment if its rims meet and its map is not much worse. What is known of the match stays. */
+static orb_status retry_at_rims(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
+                                orb_alignment *out) {
+  orb_alignment other;
+  const orb_status status = align_at_rims(ctx, shapes, options, &other);
+  if (status == ORB_OK && other.rim_count > 0 && other.energy - 1 <= 2 * (out->energy - 1) + 1) {
+    other.match = out->match;
+    other.alternatives = out->alternatives;
+    other.alternative_count = out->alternative_count;
+    out->alternatives = NULL;
+    orb_alignment_free(ctx, out);
+    *out = other;
+    return ORB_OK;
+  }
+  orb_alignment_free(ctx, &other);
+  return status;
+}
+
+/* Rims are matched where maps are composed. */
+static orb_status match_rims(orb_context *ctx, const orb_align_shape *shapes, const orb_align_options *options,
+                             orb_alignment *out) {
+  if (options->preset == ORB_PRESET_FAST || (options->method != ORB_ALIGN_PIN && options->method != ORB_ALIGN_AUTO)) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_align_rims(ctx, options, out));
+  const int retries = options->method == ORB_ALIGN_AUTO && out->shape_count == 2 && out->landmark_count == 0 &&
+                      out->rim_count == 0 && !is_large(shapes, 2, options);
+  return retries ? retry_at_rims(ctx, shapes, options, out) : ORB_OK;
 }
 
 orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -141,6 +213,7 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   if (!lifted) {
     ORB_GO(status, align_shapes(ctx, shapes, shape_count, landmarks, landmark_count, options, out), end);
   }
+  ORB_GO(status, match_rims(ctx, shapes, options, out), end);
   status = describe(ctx, shapes, landmarks, options, out);
 end:
   if (status != ORB_OK) {

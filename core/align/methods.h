@@ -12,6 +12,7 @@
  *   map/     the composed map, from one shape through the sphere to the other, and its optimiser
  *   find/    matches, without landmarks or in agreement with them; given landmarks that may be misplaced
  *            (find/suspects.h)
+ *   rims/    rims of filled holes that correspond, which lie on each other afterwards
  *   given.c  one method with the given landmarks, then the composed map; soft landmarks are released at the end
  *   auto.c   method `auto`: the rotation search, composed towards the matches of find/
  *   align.c  orb_align(): checks the request, chooses between given.c and auto.c, and aligns copies of large shapes

@@ -5,11 +5,13 @@
  *   int32 shapes, landmarks, found; double energy
  *   int32 1 and double bend, clear, confidence of the match, or 0
  *   int32 alternatives; for each double cost, int32 shape, int32 count, count × shapes places (int32 triangle,
- * double[3]) int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place found ×
- * shapes places, found × double[3] points, found × double confidence for each shape: int32 vertices, triangles,
- * changed; double[3] point of each vertex; position and int32 source of each added vertex; the changed triangles, each
- * with its number, corners, parent, source_triangle, material and the attributes of its corners, where the mesh has
- * them; int32 1 and the vertex of each landmark, or 0
+ *     double[3])
+ *   int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place
+ *   int32 rims; for each int32 shape, and for either side int32 hole, int32 edges, double length; double off
+ *   found × shapes places, found × double[3] points, found × double confidence
+ *   for each shape: int32 vertices, triangles, changed; double[3] point of each vertex; position and int32 source of
+ *     each added vertex; the changed triangles, each with its number, corners, parent, source_triangle, material and
+ * the attributes of its corners, where the mesh has them; int32 1 and the vertex of each landmark, or 0
  *
  * A triangle that is not listed is that of the given mesh, with itself as parent. */
 #include "orbmorph/kept.h"
@@ -21,11 +23,11 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { VERSION = 5, BYTE_ORDER_MARK = 0x01020304 };
+enum { VERSION = 6, BYTE_ORDER_MARK = 0x01020304 };
 static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 
 /* A new member of the alignment must be written and read here, with a new VERSION. */
-_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 128, "write and read the new member");
+_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 144, "write and read the new member");
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
                "write and read the new member");
 
@@ -172,6 +174,20 @@ static void put_suspects(writer *w, const orb_alignment *a) {
   }
 }
 
+static void put_rims(writer *w, const orb_alignment *a) {
+  put_integer(w, a->rim_count);
+  for (int32_t i = 0; i < a->rim_count; i++) {
+    const orb_rim_match *one = &a->rims[i];
+    put_integer(w, one->shape);
+    for (int k = 0; k < 2; k++) {
+      put_integer(w, one->hole[k]);
+      put_integer(w, one->edges[k]);
+      put(w, &one->length_relative[k], sizeof one->length_relative[k]);
+    }
+    put(w, &one->off_relative, sizeof one->off_relative);
+  }
+}
+
 static void put_found(writer *w, const orb_alignment *a) {
   const size_t found = (size_t)a->found_count;
   put_places(w, a->found, found * (size_t)a->shape_count);
@@ -197,6 +213,7 @@ orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, 
   put(&w, &alignment->energy, sizeof alignment->energy);
   put_match(&w, alignment);
   put_suspects(&w, alignment);
+  put_rims(&w, alignment);
   put_found(&w, alignment);
   for (int32_t s = 0; s < alignment->shape_count; s++) {
     put_shape(&w, shapes[s].mesh, &alignment->shapes[s], alignment->landmark_count);
@@ -412,6 +429,32 @@ static orb_status take_suspects(orb_context *ctx, reader *r, const orb_align_sha
   return ORB_OK;
 }
 
+static orb_status take_rims(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
+  enum { BYTES = 5 * sizeof(int32_t) + 3 * sizeof(double) }; /* of an entry */
+  const int32_t count = take_integer(r, 0, out->shape_count > 1 ? INT32_MAX : 0);
+  if (count == 0 || (size_t)count > r->left / BYTES) {
+    r->bad |= count > 0;
+    return ORB_OK;
+  }
+  out->rims = ORB_NEW0(ctx, orb_rim_match, count);
+  if (!out->rims) {
+    return ORB_E_NO_MEMORY;
+  }
+  out->rim_count = count;
+  for (int32_t i = 0; i < count; i++) {
+    orb_rim_match *one = &out->rims[i];
+    one->shape = take_integer(r, 1, out->shape_count - 1);
+    for (int k = 0; k < 2; k++) {
+      const int32_t most = shapes[k == 0 ? 0 : one->shape].mesh->triangle_count;
+      one->hole[k] = take_integer(r, 0, most);
+      one->edges[k] = take_integer(r, 0, most);
+      take(r, &one->length_relative[k], sizeof one->length_relative[k]);
+    }
+    take(r, &one->off_relative, sizeof one->off_relative);
+  }
+  return ORB_OK;
+}
+
 static orb_status take_found(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
   const size_t found = (size_t)out->found_count, places = found * (size_t)out->shape_count;
   out->found = ORB_NEW0(ctx, orb_place, places);
@@ -446,6 +489,7 @@ static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *s
   out->found_count = found;
   ORB_TRY(take_match(ctx, r, shapes, out));
   ORB_TRY(take_suspects(ctx, r, shapes, out));
+  ORB_TRY(take_rims(ctx, r, shapes, out));
   if (found > 0) {
     ORB_TRY(take_found(ctx, r, shapes, out));
   }

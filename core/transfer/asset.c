@@ -8,6 +8,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "mesh/holes.h"
 #include "transfer/distinct.h"
 #include "transfer/fit.h"
 #include "transfer/holes.h"

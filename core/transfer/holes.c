@@ -5,20 +5,12 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "mesh/dropped.h"
+#include "mesh/holes.h"
 #include "numeric/vec3.h"
 
 /* Area of a group of slivers, as a share of the surface. The coordinates of an asset are rounded by 6e-8, so a group
  * with less is no higher than rounding. */
 static const double SLIVER = 1e-8;
-
-int orb_has_holes(const orb_mesh *mesh) {
-  for (int32_t t = 0; mesh->source_triangle && t < mesh->triangle_count; t++) {
-    if (mesh->source_triangle[t] == ORB_MADE_FILL) {
-      return 1;
-    }
-  }
-  return 0;
-}
 
 typedef struct grouping {
   const orb_supermesh *supermesh;
@@ -95,8 +87,51 @@ end:
   return status;
 }
 
-orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
+/* Is hole `hole` of a side, 0: the first shape, matched with one of shape s? */
+static int is_matched(const orb_alignment *a, int32_t s, int side, int32_t hole) {
+  for (int32_t i = 0; i < a->rim_count; i++) {
+    if (a->rims[i].shape == s && a->rims[i].hole[side] == hole) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
+/* Where both the first shape and shape s have holes: those without a counterpart. */
+static orb_status drop_unmatched(orb_context *ctx, const orb_alignment *a, int32_t s, orb_dropped **list,
+                                 int32_t *count) {
+  orb_hole_list holes[2] = {0};
+  orb_status status;
+  char where[64];
+  ORB_GO(status, orb_holes_find(ctx, &a->shapes[0].mesh, &holes[0]), done);
+  ORB_GO(status, orb_holes_find(ctx, &a->shapes[s].mesh, &holes[1]), done);
+  for (int32_t i = 0; i < holes[0].count; i++) {
+    (void)snprintf(where, sizeof where, "shapes[%d], hole %d of shapes[0]", s, i + 1);
+    if (!is_matched(a, s, 0, i)) {
+      ORB_GO(status,
+             orb_dropped_add(ctx, list, count, "surface", where,
+                             "No hole of this shape corresponds to it, so the asset omits the surface there."),
+             done);
+    }
+  }
+  for (int32_t i = 0; i < holes[1].count; i++) {
+    (void)snprintf(where, sizeof where, "shapes[%d], hole %d", s, i + 1);
+    if (!is_matched(a, s, 1, i)) {
+      ORB_GO(status,
+             orb_dropped_add(ctx, list, count, "holes", where,
+                             "No hole of the first shape corresponds to it, so it stays filled."),
+             done);
+    }
+  }
+done:
+  orb_holes_free(ctx, &holes[0]);
+  orb_holes_free(ctx, &holes[1]);
+  return status;
+}
+
+orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, const orb_alignment *alignment,
                              const orb_asset_options *options, int is_file, orb_dropped **list, int32_t *count) {
+  const orb_aligned_shape *shapes = alignment->shapes;
   const int first = orb_has_holes(&shapes[0].mesh);
   const int is_open = first && (is_file || (options->holes == ORB_HOLES_REOPEN && supermesh->has_rims));
   if (first && !is_open && options->holes == ORB_HOLES_REOPEN) {
@@ -115,6 +150,8 @@ orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, c
       ORB_TRY(
           orb_dropped_add(ctx, list, count, "surface", where,
                           "The first shape has holes and this shape has none, so the asset omits the surface there."));
+    } else if (has && is_open) {
+      ORB_TRY(drop_unmatched(ctx, alignment, s, list, count));
     }
   }
   return ORB_OK;

@@ -4,9 +4,6 @@
 
 #include "orbmorph/asset.h"
 
-/* Whether fill_holes has filled a hole of the mesh. O(triangles). */
-int orb_has_holes(const orb_mesh *mesh);
-
 /* Assigns slivers on a rim to the side on which they lie. The three corners of such a triangle are on one edge of
  * the rim, so rounding decides where its centre is; a lone one on the wrong side would leave a gap, or a flap. home:
  * for each triangle of the supermesh the triangle of the first shape that holds its centre; that of a group of slivers
@@ -15,9 +12,10 @@ ORB_MUST_CHECK orb_status orb_holes_settle(orb_context *ctx, const orb_supermesh
                                            int32_t *home);
 
 /* Adds to the list what the asset lacks for its holes: those of the first shape that stay filled, and what is open on
- * the first shape or on a later one only. is_file: the triangles of the asset are those of the first shape's file. */
+ * the first shape or on a later one only, by the alignment's matches of rims. is_file: the triangles of the asset are
+ * those of the first shape's file. */
 ORB_MUST_CHECK orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh,
-                                            const orb_aligned_shape *shapes, const orb_asset_options *options,
+                                            const orb_alignment *alignment, const orb_asset_options *options,
                                             int is_file, orb_dropped **list, int32_t *count);
 
 #endif

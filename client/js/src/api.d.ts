@@ -542,6 +542,17 @@ export type Supermesh = {
     /** The reason. */
     why: string;
   }>;
+  /** Filled holes of the first shape and of a later one that correspond: the rims lie on each other. Only if there are any; `dropped` names the other holes. Holes are numbered from 1, in the order in which they were filled. */
+  rims?: Array<{
+    /** The later shape. */
+    shape: number;
+    /** The hole of the first shape. */
+    base: Rim;
+    /** The hole of the later shape. */
+    other: Rim;
+    /** How far a vertex of the first rim is from the other rim at most, on the later shape, relative to its diagonal. 0 up to rounding where all points of the rims meet. */
+    off_relative: number;
+  }>;
   /** What `transfer` copied to the asset. Only if the request has it. */
   transferred?: Array<{
     /** The shape. */
@@ -565,6 +576,14 @@ export type Supermesh = {
   /** The name and version of the engine. */
   engine: string;
   created: Instant;
+};
+
+export type Rim = {
+  hole: number;
+  /** Of the rim, in the file. */
+  edges: number;
+  /** Of the rim, relative to the diagonal. */
+  length_relative: number;
 };
 
 /** A supermesh without its report and request. */

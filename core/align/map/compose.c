@@ -357,7 +357,10 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   if (guide->target && c.pairs.landmarks > 0) {
     energy[0] = energy[1] = c.best_energy = INFINITY; /* the landmarks are apart */
   }
-  if (guide->from == ORB_MAP_FROM_PINS) {
+  if (guide->from == ORB_MAP_FROM_SPRINGS) {
+    energy[0] = energy[1] = c.best_energy = INFINITY;
+  }
+  if (guide->from == ORB_MAP_FROM_PINS || guide->from == ORB_MAP_FROM_SPRINGS) {
     ORB_GO(status, let_go(&c), done);
   } else if (guide->from == ORB_MAP_FROM_COPY) {
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);

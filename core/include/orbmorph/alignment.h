@@ -88,6 +88,17 @@ typedef struct orb_suspect {
 
 enum { ORB_SUSPECTS_MAX = 4 };
 
+/* Filled holes of the first shape and of a later one that correspond: their rims lie on each other. Holes have numbers
+ * from 0, in the order of the lowest triangles that fill them. Index 0 is the first shape. */
+typedef struct orb_rim_match {
+  int32_t shape; /* the later one */
+  int32_t hole[2];
+  int32_t edges[2];          /* of the rims, in the files */
+  double length_relative[2]; /* of the rims, to the diagonals */
+  double off_relative; /* the most that a vertex of the first rim is away from the second one on the later shape, to its
+                          diagonal; 0 up to rounding where all points of the rims meet */
+} orb_rim_match;
+
 typedef struct orb_alignment {
   int32_t shape_count, landmark_count;
   orb_aligned_shape *shapes;
@@ -106,9 +117,11 @@ typedef struct orb_alignment {
   orb_alternative *alternatives;
   int32_t suspect_count; /* at most ORB_SUSPECTS_MAX, by falling distance */
   orb_suspect *suspects;
+  int32_t rim_count;
+  orb_rim_match *rims; /* by rising number of the shape; pin and auto with a composed map */
 } orb_alignment;
 
-/* Frees the shapes, the found landmarks, the alternatives and the suspects, and zeroes the struct. */
+/* Frees the arrays and zeroes the struct. */
 ORB_API void orb_alignment_free(orb_context *ctx, orb_alignment *alignment);
 
 #ifdef __cplusplus

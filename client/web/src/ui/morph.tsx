@@ -255,6 +255,7 @@ export function MorphInspector() {
       <div class="row wrap gap-top">
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>
+      <Rims supermesh={supermesh} />
       <Dropped entries={supermesh.dropped} />
       <div class="row wrap gap-top">
         <Download result={result} />
@@ -338,6 +339,29 @@ function Looks({ result: { data, look } }: { result: Result }) {
         items={data.looks.map(({ name }, i) => ({ value: String(i), label: name }))}
       />
     </div>
+  );
+}
+
+/** Rims of holes that lie on each other. */
+function Rims({ supermesh }: { supermesh: Result['supermesh'] }) {
+  if (!supermesh.rims?.length) return null;
+  const one = (rim: NonNullable<Result['supermesh']['rims']>[number]) =>
+    `rim of hole ${rim.base.hole} to rim of hole ${rim.other.hole}${
+      rim.off_relative < 1e-6 ? '' : `, at most ${(100 * rim.off_relative).toPrecision(2)} % of the diagonal apart`
+    }`;
+  return (
+    <details class="dropped">
+      <summary>
+        {supermesh.rims.length === 1 ? 'A hole corresponds' : `${supermesh.rims.length} holes correspond`}
+      </summary>
+      <ul>
+        {supermesh.rims.map((rim, i) => (
+          <li key={i}>
+            <strong>{supermesh.shapes[rim.shape]?.name}</strong> {one(rim)}
+          </li>
+        ))}
+      </ul>
+    </details>
   );
 }
 

@@ -8,11 +8,12 @@
 
 /* What the first spatial targets of a composed map follow. */
 typedef enum orb_map_from {
-  ORB_MAP_FROM_SPACE, /* what fits best in space */
-  ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
-  ORB_MAP_FROM_WALK,  /* none: a landmark walk alone, which is quick. Needs `both` */
-  ORB_MAP_FROM_PINS,  /* none: the map as given is only released where it was pinned. For springs */
-  ORB_MAP_FROM_COPY   /* none: a decimated copy of the moving shape has its map already. The map as given is not used */
+  ORB_MAP_FROM_SPACE,   /* what fits best in space */
+  ORB_MAP_FROM_MAP,     /* the map as given, which is roughly right */
+  ORB_MAP_FROM_WALK,    /* none: a landmark walk alone, which is quick. Needs `both` */
+  ORB_MAP_FROM_PINS,    /* none: the map as given is only released where it was pinned. For springs */
+  ORB_MAP_FROM_SPRINGS, /* none: springs draw the map as given, even if that costs energy */
+  ORB_MAP_FROM_COPY /* none: a decimated copy of the moving shape has its map already. The map as given is not used */
 } orb_map_from;
 
 /* Vertices of the two shapes that springs draw together. */
@@ -55,7 +56,7 @@ typedef struct orb_map_guide {
   orb_map_course *course; /* with a target: NULL, or set */
   int walks_first; /* with a target and `both`: a walk is tried before the start from the targets, and in its place
                     where it leads to a map */
-  orb_map_springs springs; /* with ORB_MAP_FROM_PINS and ORB_MAP_FROM_COPY */
+  orb_map_springs springs; /* with ORB_MAP_FROM_PINS, ORB_MAP_FROM_SPRINGS and ORB_MAP_FROM_COPY */
   orb_map_level_map copy;  /* with ORB_MAP_FROM_COPY */
 } orb_map_guide;
 

@@ -1,0 +1,109 @@
+#include "align/rims/alone.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "mesh/holes.h"
+#include "numeric/rotation.h"
+#include "numeric/vec3.h"
+
+enum { SAMPLES = 96 }; /* of a rim: a multiple of ORB_RIMS_ALONE */
+
+/* What a rotation in space costs, by half a turn squared, against the squared distance of the rims in their mean
+ * radius: files usually have shapes upright. Circles fit under any turn. */
+static const double TURN_COST = 0.1;
+
+typedef struct rim {
+  orb_place place[SAMPLES];
+  double at[SAMPLES][3]; /* around their mean, of mean squared length 1 */
+} rim;
+
+/* Even samples of a rim. */
+static void sample(const orb_mesh *mesh, const orb_hole_list *holes, const orb_hole *hole, rim *out) {
+  double mean[3] = {0, 0, 0}, size = 0;
+  int32_t k = 0;
+  for (int i = 0; i < SAMPLES; i++) {
+    const double s = hole->length * i / SAMPLES;
+    while (k + 1 < hole->count && holes->at[hole->start + k + 1] <= s) {
+      k++;
+    }
+    const int32_t h = holes->half_edges[hole->start + k];
+    const double begin = holes->at[hole->start + k];
+    const double end = k + 1 < hole->count ? holes->at[hole->start + k + 1] : hole->length;
+    const double t = end > begin ? (s - begin) / (end - begin) : 0;
+    memset(&out->place[i], 0, sizeof out->place[i]);
+    out->place[i].triangle = h / 3;
+    out->place[i].at[h % 3] = 1 - t;
+    out->place[i].at[orb_next(h) % 3] = t;
+    orb_place_position(mesh, &out->place[i], out->at[i]);
+    for (int c = 0; c < 3; c++) {
+      mean[c] += out->at[i][c] / SAMPLES;
+    }
+  }
+  for (int i = 0; i < SAMPLES; i++) {
+    orb_sub(out->at[i], mean, out->at[i]);
+    size += orb_dot(out->at[i], out->at[i]) / SAMPLES;
+  }
+  for (int i = 0; i < 3 * SAMPLES; i++) {
+    out->at[i / 3][i % 3] /= size > 0 ? sqrt(size) : 1;
+  }
+}
+
+/* How badly the rims fit if sample i of the first one goes to sample i + turn of the second one. */
+static double cost_of(const rim rims[2], int turn) {
+  double h[9] = {0}, r[9], sum = 0;
+  for (int i = 0; i < SAMPLES; i++) {
+    orb_add_outer(h, rims[0].at[i], rims[1].at[(i + turn) % SAMPLES], 1);
+  }
+  if (!orb_nearest_rotation(h, r)) {
+    return INFINITY;
+  }
+  for (int i = 0; i < SAMPLES; i++) {
+    const double *p = rims[1].at[(i + turn) % SAMPLES], *q = rims[0].at[i];
+    for (int c = 0; c < 3; c++) {
+      const double off = r[3 * c] * p[0] + r[3 * c + 1] * p[1] + r[3 * c + 2] * p[2] - q[c];
+      sum += off * off / SAMPLES;
+    }
+  }
+  const double angle = acos(fmin(fmax(0.5 * (r[0] + r[4] + r[8] - 1), -1), 1)) / M_PI;
+  return sum + TURN_COST * angle * angle;
+}
+
+/* The only hole of a list; NULL: there is none, or there are several. */
+static const orb_hole *only(const orb_hole_list *holes) {
+  return holes->count == 1 && holes->of[0].is_simple && holes->of[0].length > 0 ? holes->of : NULL;
+}
+
+orb_status orb_rims_alone(orb_context *ctx, const orb_align_shape shapes[2], orb_place at[2 * ORB_RIMS_ALONE],
+                          int *found) {
+  orb_hole_list holes[2] = {0};
+  rim rims[2];
+  orb_status status;
+  *found = 0;
+  ORB_GO(status, orb_holes_find(ctx, shapes[0].mesh, &holes[0]), done);
+  ORB_GO(status, orb_holes_find(ctx, shapes[1].mesh, &holes[1]), done);
+  if (!only(&holes[0]) || !only(&holes[1])) {
+    goto done;
+  }
+  int best = 0;
+  double least = INFINITY;
+  for (int s = 0; s < 2; s++) {
+    sample(shapes[s].mesh, &holes[s], only(&holes[s]), &rims[s]);
+  }
+  for (int turn = 0; turn < SAMPLES; turn++) {
+    const double cost = cost_of(rims, turn);
+    best = cost < least ? turn : best;
+    least = fmin(least, cost);
+  }
+  for (int i = 0; i < ORB_RIMS_ALONE; i++) {
+    const int k = i * (SAMPLES / ORB_RIMS_ALONE);
+    at[2 * i] = rims[0].place[k];
+    at[2 * i + 1] = rims[1].place[(k + best) % SAMPLES];
+  }
+  *found = 1;
+done:
+  orb_holes_free(ctx, &holes[0]);
+  orb_holes_free(ctx, &holes[1]);
+  return status;
+}

@@ -1,0 +1,100 @@
+#include "align/rims/pair.h"
+
+#include <math.h>
+
+#include "base/check.h"
+#include "base/memory.h"
+
+/* Lengths of rims that correspond differ at most by this factor, relative to the diagonals. */
+static const double LONGER = 4, LONGER_ALONE = 8;
+/* How far such rims are apart at most, as a share of their length: about the radius of a circle. */
+static const double APART = 0.16;
+
+enum {
+  MOST = 32
+}; /* holes of a shape that are considered, the longest first: it bounds the time for a shape of cracks
+    */
+
+/* Lengths are relative to the diagonals. */
+static double length_of(const orb_rim_side *side, int32_t hole) {
+  return side->holes.of[hole].length / side->diagonal;
+}
+
+/* The mean distance from where the map takes a rim to a rim there. */
+static double distance_from(const orb_rim_side *from, int32_t rim, const orb_rim_side *to, int32_t other) {
+  const orb_hole *hole = &from->holes.of[rim];
+  double sum = 0;
+  for (int32_t k = 0; k < hole->count; k++) {
+    double distance;
+    (void)orb_rim_nearest(to, &to->holes.of[other], from->image + 3 * (size_t)(hole->start + k), &distance);
+    sum += distance;
+  }
+  return sum / hole->count / to->diagonal;
+}
+
+/* The longest holes whose rims are simple, longest first. Returns how many. */
+static int32_t longest(const orb_rim_side *side, int32_t out[MOST]) {
+  int32_t count = 0;
+  for (int32_t i = 0; i < side->holes.count; i++) {
+    if (!side->holes.of[i].is_simple || !(side->holes.of[i].length > 0)) {
+      continue;
+    }
+    int32_t at = count < MOST ? count++ : MOST;
+    for (; at > 0 && side->holes.of[out[at - 1]].length < side->holes.of[i].length; at--) {
+      if (at < MOST) {
+        out[at] = out[at - 1];
+      }
+    }
+    if (at < MOST) {
+      out[at] = i;
+    }
+  }
+  return count;
+}
+
+/* INFINITY: the two holes do not correspond. */
+static double cost_of(const orb_rim_side sides[2], int32_t a, int32_t b, int alone) {
+  const double lengths[2] = {length_of(&sides[0], a), length_of(&sides[1], b)};
+  const double longer = fmax(lengths[0], lengths[1]) / fmin(lengths[0], lengths[1]);
+  if (!(longer <= (alone ? LONGER_ALONE : LONGER))) {
+    return INFINITY;
+  }
+  const double apart = 0.5 * (distance_from(&sides[0], a, &sides[1], b) + distance_from(&sides[1], b, &sides[0], a));
+  return alone || apart <= APART * 0.5 * (lengths[0] + lengths[1]) ? apart : INFINITY;
+}
+
+orb_status orb_rims_pair(orb_context *ctx, const orb_rim_side sides[2], orb_rim_pair **pairs, int32_t *count) {
+  int32_t hole[2][MOST], holes[2] = {longest(&sides[0], hole[0]), longest(&sides[1], hole[1])};
+  const int alone = holes[0] == 1 && holes[1] == 1;
+  double cost[MOST][MOST];
+  *count = 0;
+  *pairs = ORB_NEW(ctx, orb_rim_pair, MOST);
+  if (!*pairs) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t a = 0; a < holes[0]; a++) {
+    for (int32_t b = 0; b < holes[1]; b++) {
+      cost[a][b] = cost_of(sides, hole[0][a], hole[1][b], alone);
+    }
+  }
+  for (;;) {
+    int32_t best[2] = {0, 0};
+    double least = INFINITY;
+    for (int32_t a = 0; a < holes[0]; a++) {
+      for (int32_t b = 0; b < holes[1]; b++) {
+        if (cost[a][b] < least) {
+          least = cost[a][b];
+          best[0] = a;
+          best[1] = b;
+        }
+      }
+    }
+    if (!(least < INFINITY)) {
+      return ORB_OK;
+    }
+    (*pairs)[(*count)++] = (orb_rim_pair){{hole[0][best[0]], hole[1][best[1]]}};
+    for (int32_t i = 0; i < MOST; i++) {
+      cost[best[0]][i] = cost[i][best[1]] = INFINITY;
+    }
+  }
+}

@@ -1,0 +1,27 @@
+/* Rims of filled holes that correspond.
+ *
+ * A hole of the first shape is open in the asset, and what lies there on a later shape is left out. So where a later
+ * shape has the same hole, its rim has to lie on that of the first shape: else a strip of its surface is lost, or a
+ * strip of what fills its hole shows.
+ *
+ * Comes in: an alignment. Goes out: the same, in which the rims of holes that correspond lie on each other. Read in
+ * this order:
+ *
+ *   side.h   one of the two shapes, its holes, and where the map takes their rims
+ *   pair.h   which holes correspond
+ *   along.h  which points of two rims correspond
+ *   rims.c   the map composed again, with these points held
+ *   alone.h  which points correspond without a map
+ */
+#ifndef ORB_ALIGN_RIMS_RIMS_H
+#define ORB_ALIGN_RIMS_RIMS_H
+
+#include "orbmorph/align.h"
+
+/* Finds the holes of the later shapes that correspond to holes of the first one, makes the points of their rims
+ * landmarks of their own, beside those of the alignment, and composes the map to each such shape again, from where the
+ * alignment takes it. Fills out->rims, and sets out->energy. A shape for which that gives no map stays as it is.
+ * Nothing happens unless two shapes have filled holes. */
+ORB_MUST_CHECK orb_status orb_align_rims(orb_context *ctx, const orb_align_options *options, orb_alignment *out);
+
+#endif
