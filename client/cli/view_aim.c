@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "view_legs.h"
 #include "view_pose.h"
 
 enum {
@@ -16,6 +17,8 @@ enum {
 /* A mirror image has to fill this much more of the same cells along one axis than along the others. */
 static const double CLEARLY_MIRRORED = 0.15;
 static const double MIRRORED = 0.35;
+/* Of two sides whose areas differ by less, the one nearer to the front shows. */
+static const double ALIKE = 0.01;
 /* Flatter than this, relative to the largest extent, a shape has no cells to count. */
 static const double FLAT = 0.02;
 
@@ -113,11 +116,17 @@ static int feet(const grid *g, int axis, int high_end, int across) {
   return count;
 }
 
+/* The way up of a mirrored body on this many feet that lies; 'y': none. */
+static char find_standing(const grid *g, int across, int legs) {
+  for (size_t i = 0; i < VIEW_WAYS; i++) {
+    if (view_ways[i].axis != across && feet(g, view_ways[i].axis, view_ways[i].high_end, across) == legs) {
+      return view_ways[i].up;
+    }
+  }
+  return 'y';
+}
+
 static char find_up(const view_mesh *mesh) {
-  static const struct {
-    char up;
-    int axis, high_end;
-  } ways[] = {{'z', 2, 0}, {'Z', 2, 1}, {'x', 0, 0}, {'X', 0, 1}};
   grid g;
   if (!fill(mesh, &g)) {
     return 'y';
@@ -125,17 +134,14 @@ static char find_up(const view_mesh *mesh) {
   double mirror[3] = {mirrored(&g, 0), mirrored(&g, 1), mirrored(&g, 2)};
   int sideways = mirror[1] > mirror[0] + CLEARLY_MIRRORED && mirror[1] > mirror[2] + CLEARLY_MIRRORED;
   int across = sideways ? 1 : mirror[0] >= mirror[2] ? 0 : 2;
-  if (mirror[across] < MIRRORED || (!sideways && (feet(&g, 1, 0, across) || feet(&g, 1, 1, across)))) {
-    return 'y';
+  const int is_mirrored = mirror[across] >= MIRRORED;
+  const int below = is_mirrored && !sideways ? feet(&g, 1, 0, across) : 0;
+  const int stands = below || (is_mirrored && !sideways && feet(&g, 1, 1, across));
+  char up = is_mirrored && !stands ? find_standing(&g, across, 4) : 'y';
+  if (up == 'y' && below != 4) {
+    up = view_find_biped(mesh, is_mirrored && sideways);
   }
-  for (int legs = 4; legs >= 2; legs -= 2) {
-    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
-      if (ways[i].axis != across && feet(&g, ways[i].axis, ways[i].high_end, across) == legs) {
-        return ways[i].up;
-      }
-    }
-  }
-  return 'y';
+  return up == 'y' && is_mirrored && !stands ? find_standing(&g, across, 2) : up;
 }
 
 /* Twice the area that the shapes show from a direction, since half of a closed surface faces the viewer. */
@@ -161,21 +167,31 @@ static double shown(const view_mesh *mesh, const double to[3]) {
   return sum;
 }
 
+/* The same for a rotation around the up axis, in degrees. */
+static double shown_at(const view_mesh *mesh, view_rotation rotation, double degrees) {
+  const double angle = degrees * 3.14159265358979 / 180;
+  double to[3];
+  for (int k = 0; k < 3; k++) {
+    to[k] = sin(angle) * rotation[0][k] + cos(angle) * rotation[2][k];
+  }
+  return shown(mesh, to);
+}
+
 static double find_yaw(const view_mesh *mesh, char up) {
   view_rotation rotation;
   double best = 0, yaw = 0;
   view_upright(up, rotation);
   for (int degrees = -90; degrees < 90; degrees += YAW_STEP) {
-    double angle = degrees * 3.14159265358979 / 180, to[3];
-    for (int k = 0; k < 3; k++) {
-      to[k] = sin(angle) * rotation[0][k] + cos(angle) * rotation[2][k];
-    }
-    double area = shown(mesh, to);
+    double area = shown_at(mesh, rotation, degrees);
     /* of sides of nearly the same area, prefer the one nearer to the front */
     if (area > 1.001 * best || (area > 0.999 * best && abs(degrees) < fabs(yaw))) {
       best = fmax(area, best);
       yaw = degrees;
     }
+  }
+  const double less = shown_at(mesh, rotation, yaw - DEPTH_YAW), more = shown_at(mesh, rotation, yaw + DEPTH_YAW);
+  if (fabs(less - more) > ALIKE * fmax(less, more)) {
+    return less > more ? yaw - DEPTH_YAW : yaw + DEPTH_YAW;
   }
   return yaw > 0 ? yaw - DEPTH_YAW : yaw + DEPTH_YAW;
 }

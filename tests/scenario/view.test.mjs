@@ -7,6 +7,7 @@ import { folder, run } from './support/cli.mjs';
 import { writeGlb } from './support/glb_write.mjs';
 import { readPng, writePng } from './support/png.mjs';
 import { samples } from './support/daemon.mjs';
+import * as real from './support/real.mjs';
 import { ball, parse } from './support/shapes.mjs';
 
 /** A GLB of one square in the plane z = 0, from (−1,−1) to (1,1), moved by one morph target. */
@@ -207,6 +208,74 @@ test('view looks at the largest side, whichever way a shape faces', async (t) =>
     assert.ok(width > 2.3 * height, `turned by ${angle}: ${width} × ${height}`);
   }
 });
+
+/** The same mesh with other axes up. */
+const turns = {
+  'z up': ([x, y, z]) => [x, -z, y],
+  'z up, sideways': ([x, y, z]) => [z, x, y],
+  'x up': ([x, y, z]) => [y, -x, z],
+  'z down': ([x, y, z]) => [x, z, -y],
+};
+
+/** That a mesh whose y axis points up looks as high and wide under all turns, without --up. */
+async function assertUpright(t, mesh, what) {
+  const upright = outline(await drawAsIs(t, still(mesh), '--up', 'y'));
+  for (const [name, turn] of Object.entries({ 'y up': (p) => p, ...turns })) {
+    const seen = outline(await drawAsIs(t, still(mesh, turn)));
+    for (const key of ['pixels', 'width', 'height'])
+      assert.ok(
+        Math.abs(seen[key] - upright[key]) < 0.08 * upright[key],
+        `${what}, ${name}: ${JSON.stringify([seen, upright])}`,
+      );
+  }
+}
+
+/** A person of ellipsoids: head, trunk, legs, and arms that hang, stretch out or point up. */
+function person(arms) {
+  const parts = [
+    [
+      [0, 1.6, 0],
+      [0.1, 0.13, 0.11],
+    ],
+    [
+      [0, 1.15, 0],
+      [0.2, 0.36, 0.13],
+    ],
+    ...[-1, 1].map((side) => [
+      [0.12 * side, 0.45, 0],
+      [0.08, 0.47, 0.09],
+    ]),
+    ...[-1, 1].map((side) =>
+      arms === 'out'
+        ? [
+            [0.5 * side, 1.4, 0],
+            [0.37, 0.06, 0.06],
+          ]
+        : [
+            [0.27 * side, arms === 'up' ? 1.7 : 1.1, 0],
+            [0.06, 0.37, 0.06],
+          ],
+    ),
+  ];
+  const mesh = { positions: [], triangles: [] };
+  for (const [centre, radii] of parts) {
+    const one = ball(3, (p) => p.map((x, k) => centre[k] + radii[k] * x));
+    const first = mesh.positions.length;
+    mesh.positions.push(...one.positions);
+    mesh.triangles.push(...one.triangles.map((t) => t.map((v) => v + first)));
+  }
+  return mesh;
+}
+
+test('view shows people upright whatever axis points up in their file', async (t) => {
+  for (const arms of ['down', 'out', 'up']) await assertUpright(t, person(arms), `arms ${arms}`);
+});
+
+for (const name of ['ada-sit', 'ben-crouch', 'dan-run', 'emmy-armsup'])
+  test(`view shows ${name} upright`, { skip: !real.there }, async (t) => {
+    const file = path.join(real.folder, 'posed', `${name}.obj`);
+    await assertUpright(t, parse(await readFile(file, 'utf8')), name);
+  });
 
 test('view shows animals upright whatever axis points up in their file', async (t) => {
   const dog = parse(await readFile(path.join(samples, 'dog.obj'), 'utf8'));

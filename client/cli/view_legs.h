@@ -1,0 +1,19 @@
+/* Bodies on two legs that lie along y, as a person in a file whose z axis points up. */
+#ifndef ORB_CLI_VIEW_LEGS_H
+#define ORB_CLI_VIEW_LEGS_H
+
+#include "view_mesh.h"
+
+/* Ways up other than y. */
+enum { VIEW_WAYS = 4 };
+typedef struct view_way {
+  char up;            /* as in view_options */
+  int axis, high_end; /* high_end: its high end is down */
+} view_way;
+extern const view_way view_ways[VIEW_WAYS];
+
+/* The way up of such a body, by slices across the long axes: legs are two pieces, and end in one. 'y': none, or y may
+ * be its height. sideways: the shape is its mirror image along y, which then does not point up. */
+char view_find_biped(const view_mesh *mesh, int sideways);
+
+#endif
