@@ -115,7 +115,9 @@ part_cluster() {
       tests/tools/with_postgresql.sh tests/tools/with_s3.sh tests/tools/with_nodes.sh \
         node --test --test-reporter=spec "tests/scenario/$name.test.mjs"
     done
-    for name in s3 migrate nodes; do
+    echo "$ORB_S3_SERVER: s3"
+    tests/tools/with_s3.sh node --test --test-reporter=spec tests/scenario/s3.test.mjs
+    for name in migrate nodes; do
       echo "$ORB_S3_SERVER: $name"
       ORB_ROUNDS=${ORB_ROUNDS:-500} tests/tools/with_postgresql.sh tests/tools/with_s3.sh \
         node --test --test-reporter=spec "tests/scenario/$name.test.mjs"

@@ -185,9 +185,9 @@ int pgsql_restore(pgsql_connection *c) {
     return refuse(c, SQL_IOERR, "the database does not answer");
   }
   PQreset(c->server);
-  sql_postgresql_note(PQstatus(c->server) != CONNECTION_OK);
   __atomic_store_n(&tried, now_ms(), __ATOMIC_RELAXED);
   int code = PQstatus(c->server) == CONNECTION_OK ? begin(c) : pgsql_failed(c, NULL);
+  sql_postgresql_note(PQstatus(c->server) != CONNECTION_OK); /* pgbouncer takes connections also without the server */
   if (code == SQL_OK) {
     log_info("catalogue: connected to the database again");
   } else {

@@ -35,10 +35,11 @@ esac
 folder=$(mktemp -d /tmp/orbmorph-s3-XXXXXX)
 server=
 finish() {
+  exec 2>/dev/null # bash would report the ends of these processes
   for pid in $server $(cat "$folder/restarted" "$folder/data/cluster" 2>/dev/null || true); do
     kill -9 "$pid" 2>/dev/null || true
   done
-  wait "$server" 2>/dev/null || true
+  wait "$server" || true
   rm -rf "$folder"
 }
 trap finish EXIT
