@@ -3,10 +3,10 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { rigged } from '../samples/rigged.mjs';
-import { grating, obj, torus } from '../scenario/support/shapes.mjs';
+import { ball, grating, obj, torus } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { countPixels } from './pictures.mjs';
-import { button, json, openPage, sample, settled, until } from './support.mjs';
+import { button, defaultShown, json, openPage, sample, settled, until } from './support.mjs';
 
 const red = (page) => countPixels(page, '.pane-view', (r, g, b) => r > 180 && g < 110 && b < 110);
 const digits = (text) => Number(text.replace(/\D/g, ''));
@@ -174,5 +174,34 @@ test('the loop around a handle is shown in red, and the handle can be closed', a
   );
   await button(page, 'Close the handle along the red loop').click();
   await until(() => page.locator('.card.ready').count(), 'it is repaired');
+  await done();
+});
+
+/** A ball without the cap where y is below `bottom`, stretched. */
+function bust(bottom, stretch) {
+  const { positions, triangles } = ball(3, ([x, y, z]) => [x, stretch * y, 0.8 * z]);
+  return { positions, triangles: triangles.filter((t) => t.some((v) => positions[v][1] > stretch * bottom)) };
+}
+
+test('two open shapes are mended, and morph from rim to rim', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const files = [bust(-0.8, 1.3), bust(-0.6, 1.5)].map((mesh, i) => ({
+    name: `bust${i}.obj`,
+    mimeType: 'text/plain',
+    buffer: Buffer.from(obj(mesh)),
+  }));
+  await page.locator('input[type=file]').first().setInputFiles(files);
+  await page.getByText('Mend or replace the refused shapes first.').waitFor();
+  await button(page, 'Fill the holes').first().click();
+  await page.getByText('Mend or replace the refused shape first.').waitFor();
+  await button(page, 'Fill the holes').click();
+  await button(page, /^Morph 2 shapes$/).click();
+  await defaultShown(page);
+  await page.getByText('A hole corresponds').click();
+  assert.match(
+    await page.locator('details', { hasText: 'A hole corresponds' }).innerText(),
+    /bust1 rim of hole 1 to rim of hole 1/,
+  );
+  assert.equal(await page.getByText('Not in the asset').count(), 0);
   await done();
 });

@@ -96,6 +96,14 @@ function Progress({ running }: { running: Running }) {
   );
 }
 
+/** What a morph still needs. */
+function missing(ready: number) {
+  const refused = state.shapes.filter((shape) => shape.state === 'refused').length;
+  if (refused && ready + refused >= 2)
+    return refused === 1 ? 'Mend or replace the refused shape first.' : 'Mend or replace the refused shapes first.';
+  return ready === 1 ? 'Add one more shape.' : 'Add two shapes.';
+}
+
 export function Action() {
   const ready = readyShapes().length;
   const { running } = state;
@@ -120,9 +128,7 @@ export function Action() {
             {ready < 2
               ? busy
                 ? 'Uploading…'
-                : ready === 1
-                  ? 'Add one more shape.'
-                  : 'Add two shapes.'
+                : missing(ready)
               : landmarks
                 ? `${landmarks} landmark${landmarks > 1 ? 's' : ''} will meet exactly.`
                 : 'Shapes are matched without landmarks.'}
