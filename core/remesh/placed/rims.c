@@ -1,7 +1,6 @@
 #include "remesh/placed/rims.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -323,9 +322,6 @@ static orb_status place(rims *r, int keeps_tolerance, double *bound, orb_placed_
   }
   ORB_TRY(orb_placed_bounds(r->ctx, placed, bound));
   r->failed = keeps_tolerance && !is_within(r->job, bound);
-  fprintf(stderr, "place: changes %ld failed %d tris %d bounds %g %g tol %g\n", (long)changes, r->failed,
-          placed->net.triangle_count, bound[0] / r->job->diagonal[0], bound[1] / r->job->diagonal[1],
-          r->job->options->tolerance);
   return ORB_OK;
 }
 
@@ -374,7 +370,6 @@ orb_status orb_rims_add(orb_context *ctx, const orb_remesh_job *job, orb_superme
   ORB_GO(status, insert_vertices(&r), done);
   flip_needles(&r);
   ORB_GO(status, trace_all(&r), done);
-  fprintf(stderr, "traced: failed %d of %ld tris %d\n", r.failed, (long)count, r.net.triangle_count);
   status = r.failed ? ORB_OK : replace(&r, out);
 done:
   orb_net_free(ctx, &r.net);
