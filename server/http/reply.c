@@ -185,7 +185,8 @@ void reply_store(request *r, store_result result) {
     reply_refuse(
         r, "unavailable",
         "The connection to the catalogue (PostgreSQL) broke before this was stored; nothing is lost. Try again soon.");
-  } else if (catalogue_is_away(r->srv->cat) || catalogue_was_away(r->srv->cat, r->began / 1000)) {
+  } else if (!catalogue_is_taken(r->srv->cat) &&
+             (catalogue_is_away(r->srv->cat) || catalogue_was_away(r->srv->cat, r->began / 1000))) {
     reply_refuse(r, "unavailable", "The catalogue (PostgreSQL) does not answer; nothing is lost. Try again soon.");
   } else if (objects_is_read_only(r->srv->store)) {
     reply_refuse(r, "read-only",

@@ -290,6 +290,10 @@ int catalogue_is_away(const catalogue *cat) {
   return database_is_url(cat->path) && sql_postgresql_is_away();
 }
 
+int catalogue_is_taken(const catalogue *cat) {
+  return database_is_url(cat->path) && sql_postgresql_is_taken();
+}
+
 int catalogue_was_away(const catalogue *cat, int64_t since) {
   return database_is_url(cat->path) && sql_postgresql_failed_at() >= since;
 }

@@ -50,6 +50,8 @@ store_result catalogue_open_shared(const char *where, int shared, catalogue **ou
 int catalogue_is_shared(const catalogue *cat);
 /* Whether it is in PostgreSQL and PostgreSQL does not answer. */
 int catalogue_is_away(const catalogue *cat);
+/* Whether another daemon has used it since this one opened it: this one must be restarted. */
+int catalogue_is_taken(const catalogue *cat);
 /* Whether it has failed to answer at some time since `since` (orb_clock_ms()). */
 int catalogue_was_away(const catalogue *cat, int64_t since);
 void catalogue_close(catalogue *cat); /* completes all waiting writes, then stops the writer */

@@ -84,6 +84,8 @@ static int lock(pgsql_connection *c) {
   return code == SQL_OK ? take_lock(c, c->writer == SQL_SHARES) : code;
 }
 
+static int taken; /* another daemon has used the catalogue since this one opened it; __atomic */
+
 /* Checks that this connection may write here, and that it is the only one. */
 static int begin_writer(pgsql_connection *c) {
   int64_t read_only = 0, schemas = 0, holder = 0;
@@ -102,7 +104,9 @@ static int begin_writer(pgsql_connection *c) {
   code = code == SQL_OK ? lock(c) : code;
   if (code == SQL_OK && c->holder) {
     code = pgsql_run(c, "SELECT holder FROM catalogue", &holder);
-    if (code == SQL_OK && holder != c->holder) {
+    const int is_taken = code == SQL_OK && holder != c->holder;
+    __atomic_store_n(&taken, is_taken, __ATOMIC_RELAXED);
+    if (is_taken) {
       return refuse(c, SQL_BUSY, "another orbmorphd has used it meanwhile: restart this one");
     }
   }
@@ -148,6 +152,10 @@ static int is_too_soon(void) {
   return sql_postgresql_is_away() &&
          (now - last < AGAIN_MS ||
           !__atomic_compare_exchange_n(&tried, &last, now, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED));
+}
+
+int sql_postgresql_is_taken(void) {
+  return __atomic_load_n(&taken, __ATOMIC_RELAXED);
 }
 
 int sql_postgresql_is_away(void) {

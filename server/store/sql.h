@@ -84,6 +84,8 @@ extern const sql_driver sql_postgresql;
 /* Whether the server failed to answer the last attempt to connect; the second function records that. */
 int sql_postgresql_is_away(void);
 void sql_postgresql_note(int is_away);
+/* Whether another daemon has used the catalogue since this one opened it: only a restart helps then. */
+int sql_postgresql_is_taken(void);
 /* When the server last failed to answer, or a connection was found lost, in ms of the monotonic clock; 0: never. */
 int64_t sql_postgresql_failed_at(void);
 
