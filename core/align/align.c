@@ -11,6 +11,7 @@
 #include "align/map/rims/alone.h"
 #include "align/map/rims/rims.h"
 #include "align/methods.h"
+#include "align/sheet/sheet.h"
 #include "base/check.h"
 #include "base/context.h"
 #include "base/error.h"
@@ -82,11 +83,6 @@ static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, 
              : orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
 }
 
-/* Is this the failure of a copy that is too coarse, where the whole shape may succeed? */
-static int is_of_copy(orb_status status) {
-  return status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED;
-}
-
 /* Aligns copies of the later shapes, then lets the shapes follow. *lifted 0: the whole shapes must be aligned, because
  * the copies do not meet at the landmarks or are not certified, or a shape cannot follow its copy. `out` is then empty.
  */
@@ -95,7 +91,7 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
                                orb_alignment *out, int *lifted) {
   const orb_map_params params = orb_map_params_of(options->preset);
   const int32_t keep_until = orb_map_keep_until(&params, landmark_count);
-  const int32_t size = 2 * keep_until > params.copies.size ? 2 * keep_until : params.copies.size;
+  const int32_t size = orb_map_copy_size(&params, keep_until);
   orb_copies copies;
   *lifted = 0;
   orb_status status = orb_copies_create(ctx, shapes, shape_count, landmarks, landmark_count, size, keep_until, &copies);
@@ -106,11 +102,7 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
     status = orb_align_lift(ctx, &copies, landmarks, options->preset, out, lifted);
   }
   orb_copies_free(ctx, &copies);
-  if (is_of_copy(status)) {
-    orb_error_clear(ctx);
-    return ORB_OK;
-  }
-  return status;
+  return orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;
 }
 
 /* Adds what a reader may know of the alignment: found landmarks and how sure they are, or landmarks that may be
@@ -155,8 +147,7 @@ static orb_status align_at_rims(orb_context *ctx, const orb_align_shape shapes[2
   }
   pin.method = ORB_ALIGN_PIN;
   const orb_status status = orb_align_given(ctx, shapes, 2, landmarks, ORB_RIMS_ALONE, &pin, other);
-  if (is_of_copy(status)) {
-    orb_error_clear(ctx);
+  if (orb_alignment_lacks_room(ctx, status)) {
     return ORB_OK;
   }
   ORB_TRY(status);

@@ -329,11 +329,7 @@ static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, i
   if (!out->is_found) {
     posed_free(ctx, out);
   }
-  if (status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED) {
-    orb_error_clear(ctx);
-    status = ORB_OK;
-  }
-  return status;
+  return orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;
 }
 
 /* A landmark walk of a pinned alignment of two shapes. *walked 0: it led to no map, or to no better one. */
@@ -403,8 +399,7 @@ static orb_status align_by_landmarks(orb_context *ctx, const orb_align_shape *sh
     return ORB_OK;
   }
   status = create(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
-  if (p.is_found && (status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED)) {
-    orb_error_clear(ctx);
+  if (p.is_found && orb_alignment_lacks_room(ctx, status)) {
     *out = p.alignment;
     return ORB_OK;
   }

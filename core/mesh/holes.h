@@ -26,4 +26,12 @@ void orb_holes_free(orb_context *ctx, orb_hole_list *holes);
 /* Whether fill_holes has filled a hole of the mesh. O(F). */
 int orb_has_holes(const orb_mesh *mesh);
 
+/* The place at share t of a half-edge: 0 at its origin, 1 at its end. */
+static inline orb_place orb_place_on_half_edge(int32_t h, double t) {
+  orb_place place = {.triangle = h / 3};
+  place.at[h % 3] = 1 - t;
+  place.at[orb_next(h) % 3] = t;
+  return place;
+}
+
 #endif

@@ -100,27 +100,22 @@ static int is_matched(const orb_alignment *a, int32_t s, int side, int32_t hole)
 /* Where both the first shape and shape s have holes: those without a counterpart. */
 static orb_status drop_unmatched(orb_context *ctx, const orb_alignment *a, int32_t s, orb_dropped **list,
                                  int32_t *count) {
+  static const struct {
+    const char *of, *what, *why;
+  } texts[2] = {
+      {" of shapes[0]", "surface", "No hole of this shape corresponds to it, so the asset omits the surface there."},
+      {"", "holes", "No hole of the first shape corresponds to it, so it stays filled."}};
   orb_hole_list holes[2] = {0};
   orb_status status;
   char where[64];
   ORB_GO(status, orb_holes_find(ctx, &a->shapes[0].mesh, &holes[0]), done);
   ORB_GO(status, orb_holes_find(ctx, &a->shapes[s].mesh, &holes[1]), done);
-  for (int32_t i = 0; i < holes[0].count; i++) {
-    (void)snprintf(where, sizeof where, "shapes[%d], hole %d of shapes[0]", s, i + 1);
-    if (!is_matched(a, s, 0, i)) {
-      ORB_GO(status,
-             orb_dropped_add(ctx, list, count, "surface", where,
-                             "No hole of this shape corresponds to it, so the asset omits the surface there."),
-             done);
-    }
-  }
-  for (int32_t i = 0; i < holes[1].count; i++) {
-    (void)snprintf(where, sizeof where, "shapes[%d], hole %d", s, i + 1);
-    if (!is_matched(a, s, 1, i)) {
-      ORB_GO(status,
-             orb_dropped_add(ctx, list, count, "holes", where,
-                             "No hole of the first shape corresponds to it, so it stays filled."),
-             done);
+  for (int side = 0; side < 2; side++) {
+    for (int32_t i = 0; i < holes[side].count; i++) {
+      if (!is_matched(a, s, side, i)) {
+        (void)snprintf(where, sizeof where, "shapes[%d], hole %d%s", s, i + 1, texts[side].of);
+        ORB_GO(status, orb_dropped_add(ctx, list, count, texts[side].what, where, texts[side].why), done);
+      }
     }
   }
 done:

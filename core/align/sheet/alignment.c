@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "align/sheet/sheet.h"
+#include "base/error.h"
 
 void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   for (int32_t s = 0; alignment->shapes && s < alignment->shape_count; s++) {
@@ -19,6 +20,14 @@ void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   orb_free(ctx, alignment->suspects);
   orb_free(ctx, alignment->rims);
   memset(alignment, 0, sizeof *alignment);
+}
+
+int orb_alignment_lacks_room(orb_context *ctx, orb_status status) {
+  if (status != ORB_E_BAD_LANDMARKS && status != ORB_E_NOT_CERTIFIED) {
+    return 0;
+  }
+  orb_error_clear(ctx);
+  return 1;
 }
 
 void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other) {

@@ -71,6 +71,9 @@ static inline int32_t orb_sheet_swing(const orb_sheet *sheet, int32_t h) {
 /* The half-edge from vertex a to vertex b, −1 if they are not neighbours. O(valence). */
 int32_t orb_sheet_edge(const orb_sheet *sheet, int32_t a, int32_t b);
 
+/* Has an alignment failed because landmarks cannot be met there, or because a sphere has no room? Another way, or other
+ * landmarks, may succeed then, so this clears the error. */
+int orb_alignment_lacks_room(orb_context *ctx, orb_status status);
 /* Moves the alignment of less energy to *one, and frees the other. *other is empty then. */
 void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other);
 

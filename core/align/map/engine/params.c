@@ -181,3 +181,7 @@ int32_t orb_map_keep_until(const orb_map_params *params, int32_t held) {
   const int32_t kept = params->level.kept_each * held;
   return held == 0 ? 4 : kept > params->level.kept ? kept : params->level.kept;
 }
+
+int32_t orb_map_copy_size(const orb_map_params *params, int32_t keep_until) {
+  return 2 * keep_until > params->copies.size ? 2 * keep_until : params->copies.size;
+}

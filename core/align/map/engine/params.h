@@ -351,5 +351,7 @@ typedef struct orb_map_params {
 orb_map_params orb_map_params_of(orb_preset preset);
 /* Vertices of the coarsest level of a map that `held` landmarks hold. */
 int32_t orb_map_keep_until(const orb_map_params *params, int32_t held);
+/* Vertices of a decimated copy of a large shape whose coarsest level has `keep_until`. */
+int32_t orb_map_copy_size(const orb_map_params *params, int32_t keep_until);
 
 #endif

@@ -1,7 +1,6 @@
 #include "align/map/rims/alone.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/check.h"
 #include "mesh/holes.h"
@@ -28,14 +27,10 @@ static void sample(const orb_mesh *mesh, const orb_hole_list *holes, const orb_h
     while (k + 1 < hole->count && holes->at[hole->start + k + 1] <= s) {
       k++;
     }
-    const int32_t h = holes->half_edges[hole->start + k];
     const double begin = holes->at[hole->start + k];
     const double end = k + 1 < hole->count ? holes->at[hole->start + k + 1] : hole->length;
     const double t = end > begin ? (s - begin) / (end - begin) : 0;
-    memset(&out->place[i], 0, sizeof out->place[i]);
-    out->place[i].triangle = h / 3;
-    out->place[i].at[h % 3] = 1 - t;
-    out->place[i].at[orb_next(h) % 3] = t;
+    out->place[i] = orb_place_on_half_edge(holes->half_edges[hole->start + k], t);
     orb_place_position(mesh, &out->place[i], out->at[i]);
     for (int c = 0; c < 3; c++) {
       mean[c] += out->at[i][c] / SAMPLES;

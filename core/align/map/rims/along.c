@@ -163,18 +163,11 @@ static orb_place place_at(const orb_rim_side *side, const orb_hole *hole, double
   }
   const double begin = share_at(side, hole, low), end = share_at(side, hole, low + 1);
   const double t = end > begin ? fmin(fmax((s - begin) / (end - begin), 0), 1) : 0;
-  const int32_t h = side->holes.half_edges[hole->start + low];
-  orb_place place = {.triangle = h / 3};
-  place.at[h % 3] = 1 - t;
-  place.at[orb_next(h) % 3] = t;
-  return place;
+  return orb_place_on_half_edge(side->holes.half_edges[hole->start + low], t);
 }
 
 static orb_place place_of(const orb_rim_side *side, const orb_hole *hole, int32_t k) {
-  const int32_t h = side->holes.half_edges[hole->start + k];
-  orb_place place = {.triangle = h / 3};
-  place.at[h % 3] = 1;
-  return place;
+  return orb_place_on_half_edge(side->holes.half_edges[hole->start + k], 0);
 }
 
 static void add(orb_rim_points *points, orb_place first, orb_place second) {

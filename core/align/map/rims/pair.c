@@ -10,10 +10,8 @@ static const double LONGER = 4, LONGER_ALONE = 8;
 /* How far such rims are apart at most, as a share of their length: about the radius of a circle. */
 static const double APART = 0.16;
 
-enum {
-  MOST = 32
-}; /* holes of a shape that are considered, the longest first: it bounds the time for a shape of cracks
-    */
+/* Holes of a shape that are considered, the longest first: it bounds the time for a shape of cracks. */
+enum { MOST = 32 };
 
 /* Lengths are relative to the diagonals. */
 static double length_of(const orb_rim_side *side, int32_t hole) {

@@ -10,7 +10,6 @@
 #include "align/sheet/landmarks.h"
 #include "align/sheet/sheet.h"
 #include "base/check.h"
-#include "base/error.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -226,7 +225,7 @@ static orb_status open_copy(rim_job *job) {
   orb_status status;
   ORB_GO(status, find_ring(job, &ring, &beside), end);
   const int32_t count = job->count + beside, keep_until = orb_map_keep_until(&params, count);
-  const int32_t size = 2 * keep_until > params.copies.size ? 2 * keep_until : params.copies.size;
+  const int32_t size = orb_map_copy_size(&params, keep_until);
   kept = ORB_NEW0(ctx, orb_landmark, count);
   at = ORB_NEW0(ctx, orb_place, 2 * (size_t)count);
   status = kept && at ? ORB_OK : ORB_E_NO_MEMORY;
@@ -385,12 +384,8 @@ static void take(orb_context *ctx, orb_aligned_shape *fresh, orb_aligned_shape *
   memset(fresh, 0, sizeof *fresh);
 }
 
-/* Are points of the rims in places where the spheres have no room? Then the rims stay apart. */
-static int is_of_points(orb_status status) {
-  return status == ORB_E_BAD_LANDMARKS || status == ORB_E_NOT_CERTIFIED;
-}
-
-/* Composes the map to a shape with these points held. *met 0: there is no such map, and nothing has changed. */
+/* Composes the map to a shape with these points held. *met 0: there is no such map, for example because the spheres
+ * have no room for the points, and nothing has changed. */
 static orb_status hold(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, const orb_rim_side *first,
                        const orb_rim_points *points, double *energy, int *met) {
   const orb_map_params params = orb_map_params_of(preset);
@@ -406,11 +401,7 @@ static orb_status hold(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset
     take(ctx, &job.moving, &a->shapes[s]);
   }
   job_free(&job);
-  if (is_of_points(status)) {
-    orb_error_clear(ctx);
-    return ORB_OK;
-  }
-  return status;
+  return orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;
 }
 
 /* Notes the pairs in the alignment. */

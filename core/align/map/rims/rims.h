@@ -1,8 +1,8 @@
 /* Rims of filled holes that correspond.
  *
- * A hole of the first shape is open in the asset, and what lies there on a later shape is left out. So where a later
- * shape has the same hole, its rim has to lie on that of the first shape: else a strip of its surface is lost, or a
- * strip of what fills its hole shows.
+ * The asset omits the triangles that fill a hole of the first shape, and so it omits whatever surface of a later shape
+ * lies there. If a later shape has the same hole, the two rims must meet. Otherwise the asset loses a strip of that
+ * shape's surface, or shows a strip of what fills its hole.
  *
  * Comes in: an alignment. Goes out: the same, in which the rims of holes that correspond lie on each other. Read in
  * this order:
