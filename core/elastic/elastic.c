@@ -7,11 +7,12 @@
  * rotation of the whole instead, an arm raised by 150° would stay twisted, since neighbouring rotations hold each
  * other.
  *
- * A slide differs in two things. An edge should be what rotations and smoothed stretches make of it (stretch.h): bodies
- * that differ in girth otherwise drift along each other until their lengths agree. And it looks for places ahead of
- * where the mesh is, on the way that it took in the last round (momentum; Nesterov 1983). A place is where the vertex
- * is already, except for its distance from the surface, so a pull moves it along the surface by little in each round.
- */
+ * A slide differs in three things. An edge should be what rotations and smoothed stretches make of it (stretch.h):
+ * bodies that differ in girth otherwise drift along each other until their lengths agree. And it looks for places ahead
+ * of where the mesh is, on the way that it took in the last round (momentum; Nesterov 1983). A place is where the
+ * vertex is already, except for its distance from the surface, so a pull moves it along the surface by little in each
+ * round. What else moves it along the surface is the relief (relief.h): normals of a limb hardly tell how far along the
+ * limb and around it a vertex belongs, but its muscles do. */
 #include "elastic/elastic.h"
 
 #include <math.h>
@@ -22,6 +23,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "elastic/body.h"
+#include "elastic/relief.h"
 #include "elastic/stretch.h"
 #include "numeric/factor.h"
 #include "numeric/rotation.h"
@@ -32,7 +34,7 @@
 enum {
   MAP_ROUNDS = 2,    /* along the rough map alone; 8 change little */
   PLACE_ROUNDS = 6,  /* to the nearest places; 10 rank maps no better, and let wrong ones catch up */
-  SLIDE_ROUNDS = 10, /* 15 come nearer to the truth by a fiftieth */
+  SLIDE_ROUNDS = 10, /* 20 come no nearer to the truth */
   TURNS = 2,         /* of rotations and positions in a round */
   SURROUNDINGS = 4, /* a vertex takes its first rotation from the images of its surroundings, one vertex in this many of
                        the mesh. With one in 16, a limb's girth and as much of its length, noise of the rough map stays
@@ -43,9 +45,10 @@ enum {
 /* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
 static const double MAP_REACH = 0.6, FIRST_REACH = 0.6, LAST_REACH = 0.06;
 static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
-/* A longer first one lets people slide nearer to the truth, and animals of other proportions away from it. */
-static const double SLIDE_FIRST_REACH = 0.3, SLIDE_LAST_REACH = 0.06;
-static const double AHEAD = 0.8; /* of the way of the last round: how far ahead a slide looks */
+/* A slide follows the relief as far as the last reach lets it: with 0.06 people stay a twentieth farther from the
+ * truth. First ones of 0.2 to 0.6 are as good. */
+static const double SLIDE_FIRST_REACH = 0.3, SLIDE_LAST_REACH = 0.12;
+static const double AHEAD = 0.9; /* of the way of the last round: how far ahead a slide looks */
 /* The rough map keeps pulling beside the places, with this share of its strength at first, and not at all after FADED
  * of the rounds: without it a limb slides to the nearest other one. */
 static const double MAP_SHARE = 0.3, FADED = 0.7;
@@ -73,8 +76,9 @@ typedef struct registration {
   int32_t *place, *visit; /* of each vertex of a: the nearest one of b; of each vertex of b: the nearest one of a; −1:
                              not yet searched */
   orb_stretch *stretch;   /* NULL: edges are only rotated */
-  double *ahead, *last;   /* of a slide: where it looks, and where it was in the last round; NULL: none */
-  int is_alone;           /* no other registration runs beside this one: its loops run on all threads */
+  const orb_relief *relief; /* of a and b; NULL: not known */
+  double *ahead, *last;     /* of a slide: where it looks, and where it was in the last round; NULL: none */
+  int is_alone;             /* no other registration runs beside this one: its loops run on all threads */
 } registration;
 
 /* Runs body over the vertices [0, count). */
@@ -229,6 +233,20 @@ static void find_visits(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
+/* Moves the place of vertex v along the surface, to where b stands out as far as a does at v. */
+static void follow_relief(const registration *r, int32_t v, double target[3]) {
+  const size_t u = 3 * (size_t)r->place[v];
+  double from[3], step[3];
+  if (r->relief) {
+    orb_sub(target, r->b.mesh->positions + u, from);
+    orb_relief_step(r->relief[0].height + ORB_RELIEF_SIZES * (size_t)v, r->relief + 1, r->place[v], from,
+                    r->b.normal + u, step);
+    for (int k = 0; k < 3; k++) {
+      target[k] += step[k];
+    }
+  }
+}
+
 /* Each vertex of a is pulled to the nearest place of b, and each vertex of b pulls the nearest one of a. */
 static void pull_by_place(registration *r, double weight) {
   const double *position = looks_from(r);
@@ -243,6 +261,7 @@ static void pull_by_place(registration *r, double weight) {
     size_t u = 3 * (size_t)r->place[v];
     int faces = orb_dot(n, r->b.normal + u) > FACING;
     within_plane(r->b.mesh->positions + u, r->b.normal + u, x, target);
+    follow_relief(r, v, target);
     add_pull(r, v, faces ? target : x, weight * r->a.mass[v] * (faces ? 1 : HELD));
   }
   for (int32_t u = 0; u < r->b.count; u++) {
@@ -441,36 +460,48 @@ end:
   return status;
 }
 
-/* Prepares what a slide needs besides a registration. */
-static orb_status prepare_slide(registration *r, orb_stretch *stretch) {
+/* What a slide needs besides a registration. */
+typedef struct slide {
+  registration r;
+  orb_stretch stretch;
+  orb_relief relief[2]; /* of a and b */
+} slide;
+
+static orb_status prepare_slide(slide *s) {
+  registration *r = &s->r;
   const size_t n = 3 * (size_t)r->a.count;
-  ORB_TRY(orb_stretch_create(r->ctx, &r->a, stretch));
-  r->stretch = stretch;
+  ORB_TRY(orb_stretch_create(r->ctx, &r->a, &s->stretch));
+  r->stretch = &s->stretch;
   r->ahead = ORB_NEW(r->ctx, double, n);
   r->last = ORB_NEW(r->ctx, double, n);
   if (!r->ahead || !r->last) {
     return ORB_E_NO_MEMORY;
   }
   memcpy(r->last, r->pose->position, n * sizeof *r->last);
+  const double grain = orb_relief_grain(&r->a, &r->b);
+  ORB_TRY(orb_relief_create(r->ctx, &r->a, grain, 0, s->relief));
+  ORB_TRY(orb_relief_create(r->ctx, &r->b, grain, 1, s->relief + 1));
+  r->relief = s->relief;
   return ORB_OK;
 }
 
 orb_status orb_elastic_slide(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, const orb_elastic_anchors *anchors,
                              double *position) {
   orb_elastic_pose pose = {.position = position, .rotation = ORB_NEW(ctx, double, 9 * (size_t)a->vertex_count)};
-  registration r = {.ctx = ctx, .anchors = anchors, .pose = &pose, .is_alone = 1};
-  orb_stretch stretch = {0};
+  slide s = {.r = {.ctx = ctx, .anchors = anchors, .pose = &pose, .is_alone = 1}};
   orb_status status = pose.rotation ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     return status;
   }
-  ORB_GO(status, registration_create(ctx, a, b, &r), end);
-  ORB_GO(status, prepare_slide(&r, &stretch), end);
-  fit_surroundings(&r);
-  status = follow_places(&r, SLIDE_ROUNDS, SLIDE_FIRST_REACH, SLIDE_LAST_REACH);
+  ORB_GO(status, registration_create(ctx, a, b, &s.r), end);
+  ORB_GO(status, prepare_slide(&s), end);
+  fit_surroundings(&s.r);
+  status = follow_places(&s.r, SLIDE_ROUNDS, SLIDE_FIRST_REACH, SLIDE_LAST_REACH);
 end:
-  registration_free(&r);
-  orb_stretch_free(ctx, &stretch);
+  registration_free(&s.r);
+  orb_stretch_free(ctx, &s.stretch);
+  orb_relief_free(ctx, s.relief);
+  orb_relief_free(ctx, s.relief + 1);
   orb_free(ctx, pose.rotation);
   return status;
 }

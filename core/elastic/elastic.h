@@ -8,6 +8,7 @@
  *   searched.h  vertices, laid out for searches of the nearest one
  *   body.h      a mesh with what the steps read
  *   stretch.h   how the surroundings of a vertex are stretched
+ *   relief.h    how far a vertex stands out from its surroundings
  *   elastic.h   the registration
  *   carry.h     its pose, for other points
  *

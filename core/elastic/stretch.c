@@ -19,7 +19,7 @@ enum {
 };
 /* Weight of the mean stretch against the moments. With less, noise stretches thin limbs; with more, girths cannot
  * change. */
-static const double MEAN_SHARE = 0.2;
+static const double MEAN_SHARE = 0.1;
 
 typedef struct fitting {
   const orb_body *body;

@@ -1,0 +1,29 @@
+/* The relief of a surface: how far each vertex stands out from its surroundings. */
+#ifndef ORB_ELASTIC_RELIEF_H
+#define ORB_ELASTIC_RELIEF_H
+
+#include "elastic/body.h"
+
+/* Sizes of surroundings that the height is measured against. */
+enum { ORB_RELIEF_SIZES = 2 };
+
+typedef struct orb_relief {
+  double *height; /* ORB_RELIEF_SIZES per vertex, each of mean 0 and variance 1 over the surface */
+  double *slope;  /* their gradients along the surface: 3 for each height. NULL: not wanted */
+} orb_relief;
+
+/* The larger mean edge of two bodies: heights against smaller surroundings are noise of the triangles. */
+double orb_relief_grain(const orb_body *a, const orb_body *b);
+
+/* Heights, and slopes if wanted. grain: from orb_relief_grain(). Free `out` in any case. O(n · size / edge), on all
+ * threads, with the same bytes for any number of them. */
+ORB_MUST_CHECK orb_status orb_relief_create(orb_context *ctx, const orb_body *body, double grain, int wants_slope,
+                                            orb_relief *out);
+void orb_relief_free(orb_context *ctx, orb_relief *relief);
+
+/* How far, from a point near vertex u of b, a vertex of these heights lies along the surface of b: one damped
+ * Gauss–Newton step towards the same heights. from: the point, relative to u. normal: of b at u. */
+void orb_relief_step(const double *height, const orb_relief *b, int32_t u, const double from[3], const double normal[3],
+                     double step[3]);
+
+#endif
