@@ -271,9 +271,11 @@ static orb_status let_go(orb_map_run *c) {
   return orb_map_run_start(c, ORB_MAP_GIVEN);
 }
 
-/* Should the map slide? Yes, if lengths alone have led to a map of shapes that correspond. */
+/* Should the map slide? Yes, if it is good, or begins with targets on spheres that keep angles. A landmark walk of
+ * shapes of other kinds is no good map, and stays. */
 static int should_slide(const orb_map_run *c, orb_map_from from) {
-  return c->given_target ? c->keeps_angles : from == ORB_MAP_FROM_WALK && c->best_energy <= c->params.energy.good;
+  return (c->given_target || from == ORB_MAP_FROM_WALK) &&
+         (c->best_energy <= c->params.energy.good || (c->given_target && c->keeps_angles));
 }
 
 /* Writes the best map back if it is better than the alignment as given and certified. */

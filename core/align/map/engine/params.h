@@ -214,7 +214,8 @@ typedef struct orb_map_params {
                     energy */
     int sweeps;  /* without flips, before and after */
     int loosen;  /* with flips allowed */
-    double most; /* energy afterwards, relative to before */
+    double most; /* energy afterwards, relative to before. With 1.03, maps of animals of two kinds stayed: their
+                    relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
   } slide;
 
   /* Drawing a level without flips to its spatial targets. */
