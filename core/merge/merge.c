@@ -168,8 +168,8 @@ static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, in
     ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
   }
   ORB_TRY(orb_dropped_holes(ctx, &out->supermesh, &out->alignment, &options->asset,
-                            options->remesh.method == ORB_REMESH_TEMPLATE && options->file, &out->dropped,
-                            &out->dropped_count));
+                            options->remesh.method == ORB_REMESH_TEMPLATE && options->file, &out->open_holes,
+                            &out->dropped, &out->dropped_count));
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
   out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
   if (!out->transforms || !out->fits) {

@@ -162,10 +162,18 @@ done:
 }
 
 orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, const orb_alignment *alignment,
-                             const orb_asset_options *options, int is_file, orb_dropped **list, int32_t *count) {
+                             const orb_asset_options *options, int is_file, int32_t *open, orb_dropped **list,
+                             int32_t *count) {
   const orb_aligned_shape *shapes = alignment->shapes;
   const int first = orb_has_holes(&shapes[0].mesh);
   const int is_open = first && (is_file || (options->holes == ORB_HOLES_REOPEN && supermesh->has_rims));
+  *open = 0;
+  if (is_open) {
+    orb_hole_list holes;
+    ORB_TRY(orb_holes_find(ctx, &shapes[0].mesh, &holes));
+    *open = holes.count;
+    orb_holes_free(ctx, &holes);
+  }
   if (first && !is_open && options->holes == ORB_HOLES_REOPEN) {
     ORB_TRY(orb_dropped_add(ctx, list, count, "holes", "shapes[0]",
                             "Their rims could not be made edges, so they stay filled; the methods overlay and template "

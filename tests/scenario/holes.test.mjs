@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
+import { run } from './support/cli.mjs';
 import { assertProblem, daemon, slow } from './support/daemon.mjs';
 import { toTriangle } from './support/distance.mjs';
 import { morphOf } from './support/glb.mjs';
@@ -158,6 +159,7 @@ for (const remesh of REMESH)
       const first = await upload(d, mesh, name, 'fill_holes');
       const made = await d.made('/v1/supermeshes', asked([first, other], remesh));
       assertRims((await d.get(made.asset)).bytes, mesh, count, name);
+      assert.equal(made.open_holes, count, name);
       assert.deepEqual(
         made.dropped.map((entry) => [entry.what, entry.where]),
         [['surface', 'shapes[1]']],
@@ -256,10 +258,16 @@ test('holes of a later shape stay filled, and the report names them', async (t) 
   const whole = morphOf((await d.get(later.asset)).bytes);
   assert.deepEqual(rimOf(triple(whole.shapes[0]), triple(whole.triangles)), []);
 
+  const shown = await run(['get', later.id], { env: { ORBMORPH_SERVER: d.url } });
+  assert.match(shown.out, /closed, genus 0/);
+  const half = await d.made('/v1/supermeshes', asked([opened, closed], { method: 'overlay' }));
+  assert.match((await run(['get', half.id], { env: { ORBMORPH_SERVER: d.url } })).out, /open at 4 holes, genus 0/);
+
   const filled = await d.made('/v1/supermeshes', asked([opened, closed], { method: 'overlay' }, 'filled'));
   const covered = morphOf((await d.get(filled.asset)).bytes);
   assert.deepEqual(rimOf(triple(covered.shapes[0]), triple(covered.triangles)), []);
   assert.deepEqual(filled.dropped, []);
+  assert.equal(filled.open_holes, undefined);
 
   const both = await d.made('/v1/supermeshes', asked([opened, await upload(d, open[4][1], 'other', 'fill_holes')], {}));
   assertRims((await d.get(both.asset)).bytes, mask, count, 'both open');

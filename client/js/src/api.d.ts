@@ -542,6 +542,8 @@ export type Supermesh = {
     /** The reason. */
     why: string;
   }>;
+  /** How many holes of the first shape are open in the asset. Only if there are any. The certificate is about the common mesh, in which they are filled. */
+  open_holes?: number;
   /** Filled holes of the first shape and of a later one that correspond: the rims lie on each other. Only if there are any; `dropped` names the other holes. Holes are numbered from 1, in the order in which they were filled. */
   rims?: Array<{
     /** The later shape. */
