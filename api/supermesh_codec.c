@@ -409,6 +409,9 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   write_warnings(result, out);
   api_json_member_number(out, "energy", result->alignment.energy);
   write_dropped(result, out);
+  if (result->open_holes > 0) {
+    api_json_member_integer(out, "open_holes", result->open_holes);
+  }
   write_rims(&result->alignment, out);
   if (request->carry_count > 0) {
     api_json_key(out, "transferred");

@@ -174,6 +174,18 @@ void api_supermesh_request_parts(const api_supermesh_request *request, const cha
   *out = (orb_document_parts){request->parts.meshes, names, request->parts.mesh_count, request->parts.node_count};
 }
 
+/* Fewer triangles than a tetrahedron has close no surface. */
+static int check_budget(const api_supermesh_request *request, api_problem *problem) {
+  const int64_t most = request->merge.remesh.max_triangles;
+  if (most == 0 || most >= 4) {
+    return 1;
+  }
+  api_refuse(problem, "bad-option",
+             "\"max_triangles\" in \"remesh\" must be at least 4, as many as a tetrahedron has, or 0 for no limit.");
+  api_json_member_string(&problem->facts, "member", "max_triangles");
+  return 0;
+}
+
 static int check_built(const api_supermesh_request *request, api_problem *problem) {
   if (orb_remesh_available(request->merge.remesh.method)) {
     return 1;
@@ -214,7 +226,7 @@ int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, ap
          read_align(cJSON_GetObjectItemCaseSensitive(body, "align"), out, problem) &&
          (!remesh ||
           api_options_read(remesh, "\"remesh\"", remesh_table, COUNT(remesh_table), &out->merge.remesh, problem)) &&
-         check_built(out, problem) &&
+         check_built(out, problem) && check_budget(out, problem) &&
          (!transfer || api_transfer_read(transfer, out->shape_count, out->carries, &out->carry_count, problem)) &&
          (!parts || read_parts(parts, &out->parts, problem)) &&
          (!asset || api_options_read(asset, "\"asset\"", asset_table, COUNT(asset_table), &out->merge.asset, problem));

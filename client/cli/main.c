@@ -40,8 +40,9 @@ static const cli_command command_list[] = {
      COMMON_OPTIONS | CLI_BIT(OPT_LIMIT), NULL, "--json", cli_run_usage},
     {"doctor", "FILE…", "Check meshes and suggest repairs", 1, -1, COMMON_OPTIONS, NULL, "scan.stl", cli_run_doctor},
     {"view", "FILE.glb", "Draw poses of a morph into a PNG file, without the daemon", 1, 1,
-     CLI_BIT(OPT_HELP) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) | CLI_BIT(OPT_UP) |
-         CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE) | CLI_BIT(OPT_INSIDE) | CLI_BIT(OPT_FRAMES),
+     CLI_BIT(OPT_HELP) | CLI_BIT(OPT_QUIET) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) |
+         CLI_BIT(OPT_UP) | CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE) | CLI_BIT(OPT_INSIDE) |
+         CLI_BIT(OPT_FRAMES),
      NULL, "out.glb --frames 60 -o out.png", cli_run_view},
     {"sign", "URL", "Sign the URL of a morph, so that a browser can load it without a token", 1, 1,
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_KEY) | CLI_BIT(OPT_EXPIRES), NULL,

@@ -141,14 +141,25 @@ static void print_rims(const cJSON *supermesh) {
   }
 }
 
+/* Whether the surface is closed, and how many holes of it are open in the asset. */
+static void surface_of(const cJSON *supermesh, char out[64]) {
+  const double open = fmax(cli_number(supermesh, "open_holes"), 0);
+  const int closed = cJSON_IsTrue(member(member(supermesh, "certificate"), "closed"));
+  (void)snprintf(out, 64, "%s", closed ? "closed" : "not closed");
+  if (open > 0) {
+    (void)snprintf(out, 64, "open at %.0f hole%s", open, open > 1 ? "s" : "");
+  }
+}
+
 void cli_print_supermesh(const cJSON *supermesh) {
-  char vertices[32], triangles[32], error[32], rms[32];
+  char vertices[32], triangles[32], error[32], rms[32], surface[64];
   const cJSON *shape, *certificate = member(supermesh, "certificate");
   int landmarks = cJSON_GetArraySize(member(supermesh, "landmarks"));
   cli_count(cli_number(supermesh, "vertices"), vertices);
   cli_count(cli_number(supermesh, "triangles"), triangles);
+  surface_of(supermesh, surface);
   printf("%s: %s vertices, %s triangles, %s, genus %.0f\n", cli_string(supermesh, "url", "?"), vertices, triangles,
-         cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed", cli_number(certificate, "genus"));
+         surface, cli_number(certificate, "genus"));
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
     percent(cli_number(shape, "hausdorff_relative"), error);
     percent(cli_number(shape, "rms_relative"), rms);
@@ -265,7 +276,7 @@ static void markdown_warnings(FILE *out, const cJSON *supermesh) {
 }
 
 static void markdown(FILE *out, const cJSON *supermesh) {
-  char vertices[32], triangles[32];
+  char vertices[32], triangles[32], surface[64];
   const cJSON *shape, *landmark, *certificate = member(supermesh, "certificate");
   fputs("# Morph of ", out);
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
@@ -273,9 +284,10 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   }
   cli_count(cli_number(supermesh, "vertices"), vertices);
   cli_count(cli_number(supermesh, "triangles"), triangles);
+  surface_of(supermesh, surface);
   fprintf(out, "One mesh of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,
-          triangles, cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed",
-          cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"), cli_string(supermesh, "engine", "?"));
+          triangles, surface, cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"),
+          cli_string(supermesh, "engine", "?"));
   const cJSON *match = member(supermesh, "match");
   if (match) {
     fprintf(out, "The correspondence was found without landmarks; verdict: %s (confidence %.2f).\n\n",

@@ -102,7 +102,7 @@ static int draw_movie(const view_mesh *mesh, const char *png, const view_options
   return rc;
 }
 
-int view_file(const char *glb, const char *png, const view_options *options, char *error, size_t error_size) {
+int view_file(const char *glb, const char *png, view_options *options, char *error, size_t error_size) {
   view_mesh mesh;
   if (options->poses < 2 || options->poses > 100 || options->size < 16 || options->size > 4096 || options->frames < 0) {
     snprintf(error, error_size, "the number of poses must be 2 to 100 and the size 16 to 4096");
@@ -111,10 +111,8 @@ int view_file(const char *glb, const char *png, const view_options *options, cha
   if (view_mesh_read(glb, &mesh, error, error_size) != 0) {
     return -1;
   }
-  view_options aimed = *options;
   view_vertex *vertices = malloc(mesh.vertex_count * sizeof *vertices);
-  view_aim(&mesh, &aimed);
-  options = &aimed;
+  view_aim(&mesh, options);
   int rc = !vertices         ? no_memory(error, error_size)
            : options->frames ? draw_movie(&mesh, png, options, vertices, error, error_size)
                              : draw_sheet(&mesh, png, options, vertices, error, error_size);

@@ -12,7 +12,7 @@ void view_defaults(view_options *options);
  * transition from one shape to the next and a column for each pose; each pose fills its cell, and all are seen from the
  * same direction. An animation draws all shapes at one scale; it goes to the last shape and back, or around if there
  * are three or more shapes without in-betweens. Reads the files of orbmorph, and others with one mesh whose positions
- * are floats. Returns 0, or −1 with the reason in `error`. */
-int view_file(const char *glb, const char *png, const view_options *options, char *error, size_t error_size);
+ * are floats. Fills in what the options leave open. Returns 0, or −1 with the reason in `error`. */
+int view_file(const char *glb, const char *png, view_options *options, char *error, size_t error_size);
 
 #endif

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "view_base.h"
 #include "view_legs.h"
 #include "view_pose.h"
 
@@ -116,20 +117,23 @@ static int feet(const grid *g, int axis, int high_end, int across) {
   return count;
 }
 
-/* The way up of a mirrored body on this many feet that lies; 'y': none. */
+/* The way up of a mirrored body on this many feet that lies; 0: none. */
 static char find_standing(const grid *g, int across, int legs) {
   for (size_t i = 0; i < VIEW_WAYS; i++) {
     if (view_ways[i].axis != across && feet(g, view_ways[i].axis, view_ways[i].high_end, across) == legs) {
       return view_ways[i].up;
     }
   }
-  return 'y';
+  return 0;
 }
 
-static char find_up(const view_mesh *mesh) {
+/* The way up, and what says so; 0: nothing does. */
+static char find_up(const view_mesh *mesh, view_sign *sign) {
   grid g;
+  char up = 0;
+  *sign = VIEW_BY_NOTHING;
   if (!fill(mesh, &g)) {
-    return 'y';
+    return 0;
   }
   double mirror[3] = {mirrored(&g, 0), mirrored(&g, 1), mirrored(&g, 2)};
   int sideways = mirror[1] > mirror[0] + CLEARLY_MIRRORED && mirror[1] > mirror[2] + CLEARLY_MIRRORED;
@@ -137,11 +141,30 @@ static char find_up(const view_mesh *mesh) {
   const int is_mirrored = mirror[across] >= MIRRORED;
   const int below = is_mirrored && !sideways ? feet(&g, 1, 0, across) : 0;
   const int stands = below || (is_mirrored && !sideways && feet(&g, 1, 1, across));
-  char up = is_mirrored && !stands ? find_standing(&g, across, 4) : 'y';
-  if (up == 'y' && below != 4) {
-    up = view_find_biped(mesh, is_mirrored && sideways);
+  const int lies = is_mirrored && !stands;
+  *sign = VIEW_BY_FEET;
+  if ((lies && (up = find_standing(&g, across, 4)) != 0) || (below == 4 && (up = 'y') != 0)) {
+    return up;
   }
-  return up == 'y' && is_mirrored && !stands ? find_standing(&g, across, 2) : up;
+  *sign = VIEW_BY_LEGS;
+  const char biped = view_find_biped(mesh, is_mirrored && sideways);
+  if (biped && biped != 'y') {
+    return biped;
+  }
+  *sign = VIEW_BY_BASE;
+  if ((up = view_find_base(mesh)) != 0) {
+    return up;
+  }
+  *sign = VIEW_BY_LEGS;
+  if (biped) {
+    return biped;
+  }
+  *sign = VIEW_BY_FEET;
+  if ((lies && (up = find_standing(&g, across, 2)) != 0) || (below && (up = 'y') != 0)) {
+    return up;
+  }
+  *sign = VIEW_BY_NOTHING;
+  return 0;
 }
 
 /* Twice the area that the shapes show from a direction, since half of a closed surface faces the viewer. */
@@ -198,7 +221,8 @@ static double find_yaw(const view_mesh *mesh, char up) {
 
 void view_aim(const view_mesh *mesh, view_options *options) {
   if (!options->up) {
-    options->up = find_up(mesh);
+    const char up = find_up(mesh, &options->sign);
+    options->up = up ? up : 'y';
   }
   if (isnan(options->yaw)) {
     options->yaw = find_yaw(mesh, options->up);

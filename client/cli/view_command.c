@@ -31,6 +31,22 @@ static int angle(const cli *c, cli_option_id id, double *out) {
   return 0;
 }
 
+/* Says which way is up where the view has decided it. */
+static void note_up(const cli *c, const view_options *options) {
+  static const char *const by[] = {
+      [VIEW_BY_FEET] = "it stands on feet", [VIEW_BY_LEGS] = "it has two legs", [VIEW_BY_BASE] = "it has a flat base"};
+  char axis[3] = {'-', options->up, 0};
+  if (options->sign == VIEW_BY_NOTHING) {
+    cli_note(c, "nothing in the first shape tells which way is up: y is, as in glTF; --up sets another axis");
+  } else if (options->sign != VIEW_BY_USER && options->up != 'y') {
+    if (options->up < 'a') {
+      axis[1] = (char)(options->up - 'A' + 'a');
+    }
+    cli_note(c, "%s points up, since the first shape seems to stand that way: %s; --up y shows it as in glTF",
+             options->up < 'a' ? axis : axis + 1, by[options->sign]);
+  }
+}
+
 int cli_run_view(cli *c) {
   const char *glb = c->args.operands[0], *output = c->args.value[OPT_OUTPUT], *up = c->args.value[OPT_UP];
   char error[512] = "";
@@ -53,6 +69,7 @@ int cli_run_view(cli *c) {
   int rc = CLI_DONE;
   if (view_file(glb, png, &options, error, sizeof error) == 0) {
     printf("%s\n", png);
+    note_up(c, &options);
   } else {
     cli_error(c, "%s", error);
     rc = CLI_USAGE;

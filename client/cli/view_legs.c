@@ -133,13 +133,15 @@ static double legs(const slices *s, int axis, int high_end) {
 
 char view_find_biped(const view_mesh *mesh, int sideways) {
   slices s = {0};
-  char up = 'y';
+  char up = 0;
   double most = LEGS_LEAST;
   if (!slices_open(mesh, &s)) {
     return up;
   }
   if (!sideways && s.count[1] >= THIN * FINE) {
-    most = fmax(most, LEGS_OF_Y * fmax(legs(&s, 1, 0), legs(&s, 1, 1)));
+    const double below = legs(&s, 1, 0), above = legs(&s, 1, 1);
+    up = below > LEGS_LEAST && below > above ? 'y' : 0;
+    most = fmax(most, LEGS_OF_Y * fmax(below, above));
   }
   for (size_t i = 0; i < VIEW_WAYS; i++) {
     const int axis = view_ways[i].axis, high_end = view_ways[i].high_end;

@@ -12,8 +12,8 @@ typedef struct view_way {
 } view_way;
 extern const view_way view_ways[VIEW_WAYS];
 
-/* The way up of such a body, by slices across the long axes: legs are two pieces, and end in one. 'y': none, or y may
- * be its height. sideways: the shape is its mirror image along y, which then does not point up. */
+/* The way up of such a body, by slices across the long axes: legs are two pieces, and end in one. 'y' where y may be
+ * its height; 0: none. sideways: the shape is its mirror image along y, which then does not point up. */
 char view_find_biped(const view_mesh *mesh, int sideways);
 
 #endif

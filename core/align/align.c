@@ -16,6 +16,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "mesh/holes.h"
 #include "orbmorph/transfer.h"
 
 void orb_align_defaults(orb_align_options *options) {
@@ -128,16 +129,15 @@ static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, cons
   return ORB_OK;
 }
 
-/* Pins the only rims of two shapes that the search has not brought together, and composes the map from there: a disc is
- * as good a match for the back of another one as for its front. *other is empty where that gives no map. */
-static orb_status align_at_rims(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
-                                orb_alignment *other) {
+/* Pins the only rims of two shapes and composes the map from there: a disc is as good a match for the back of another
+ * one as for its front. *other is empty where that gives no map. */
+static orb_status align_by_rims(orb_context *ctx, const orb_map_params *params, const orb_align_shape shapes[2],
+                                const orb_align_options *options, orb_alignment *other) {
   orb_align_options pin = *options;
   orb_landmark landmarks[ORB_RIMS_ALONE] = {0};
   orb_place at[2 * ORB_RIMS_ALONE];
   int found;
-  memset(other, 0, sizeof *other);
-  ORB_TRY(orb_rims_alone(ctx, shapes, at, &found));
+  ORB_TRY(orb_rims_alone(ctx, params, shapes, at, &found));
   if (!found) {
     return ORB_OK;
   }
@@ -156,36 +156,90 @@ static orb_status align_at_rims(orb_context *ctx, const orb_align_shape shapes[2
     orb_free(ctx, other->shapes[s].landmark_vertices);
     other->shapes[s].landmark_vertices = NULL;
   }
-  return orb_align_rims(ctx, options, other);
+  return ORB_OK;
 }
 
-/* Takes such an alignment if its rims meet and its map is not much worse. What is known of the match stays. */
-static orb_status retry_at_rims(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
-                                orb_alignment *out) {
-  orb_alignment other;
-  const orb_status status = align_at_rims(ctx, shapes, options, &other);
-  if (status == ORB_OK && other.rim_count > 0 && other.energy - 1 <= 2 * (out->energy - 1) + 1) {
-    other.match = out->match;
-    other.alternatives = out->alternatives;
-    other.alternative_count = out->alternative_count;
-    out->alternatives = NULL;
-    orb_alignment_free(ctx, out);
-    *out = other;
-    return ORB_OK;
+/* Rotates the spheres onto each other. */
+static orb_status align_by_rotation(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
+                                    orb_alignment *other) {
+  orb_align_options rotated = *options;
+  rotated.method = ORB_ALIGN_ROTATE;
+  return orb_align_given(ctx, shapes, 2, NULL, 0, &rotated, other);
+}
+
+/* Swaps the two shapes. */
+static void swap_shapes(orb_alignment *a) {
+  const orb_aligned_shape first = a->shapes[0];
+  a->shapes[0] = a->shapes[1];
+  a->shapes[1] = first;
+  for (int32_t i = 0; i < a->alternative_count; i++) {
+    for (int32_t k = 0; k < a->alternatives[i].count; k++) {
+      orb_place *at = a->alternatives[i].at + 2 * (size_t)k, place = at[0];
+      at[0] = at[1];
+      at[1] = place;
+    }
   }
-  orb_alignment_free(ctx, &other);
+}
+
+/* The search from the second shape to the first one. Its map is another one. */
+static orb_status align_back(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
+                             orb_alignment *other) {
+  const orb_align_shape swapped[2] = {shapes[1], shapes[0]};
+  ORB_TRY(orb_align_auto(ctx, swapped, 2, options, other));
+  swap_shapes(other);
+  return ORB_OK;
+}
+
+/* Another map on which the rims are to be brought together. *taken: they are, and the map is not much worse; it has
+ * taken the place of *out. Frees *other. searched: the map comes from a search of its own; elsewhere what the search
+ * has found out stays. */
+static orb_status try_rims(orb_context *ctx, const orb_map_params *params, const orb_align_options *options,
+                           int searched, orb_alignment *other, orb_alignment *out, int *taken) {
+  const orb_status status = other->shape_count > 0 ? orb_align_rims(ctx, options, other) : ORB_OK;
+  *taken = status == ORB_OK && other->rim_count > 0 &&
+           other->energy - 1 <= params->rims.retry_times * (out->energy - 1) + params->rims.retry_more;
+  if (*taken && !searched) {
+    other->match = out->match;
+    other->alternatives = out->alternatives;
+    other->alternative_count = out->alternative_count;
+    out->alternatives = NULL;
+    out->alternative_count = 0;
+  }
+  if (*taken) {
+    orb_alignment_free(ctx, out);
+    *out = *other;
+    memset(other, 0, sizeof *other);
+  }
+  orb_alignment_free(ctx, other);
   return status;
 }
 
-/* Rims are matched where maps are composed. */
+/* Starts from other maps where the search leads to none that brings rims together. */
+static orb_status retry_at_rims(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
+                                orb_alignment *out) {
+  const orb_map_params params = orb_map_params_of(options->preset);
+  orb_alignment other = {0};
+  int taken;
+  ORB_TRY(align_by_rims(ctx, &params, shapes, options, &other));
+  ORB_TRY(try_rims(ctx, &params, options, 0, &other, out, &taken));
+  if (!taken) {
+    ORB_TRY(align_by_rotation(ctx, shapes, options, &other));
+    ORB_TRY(try_rims(ctx, &params, options, 0, &other, out, &taken));
+  }
+  if (!taken && out->energy > params.energy.poor) {
+    ORB_TRY(align_back(ctx, shapes, options, &other));
+    ORB_TRY(try_rims(ctx, &params, options, 1, &other, out, &taken));
+  }
+  return ORB_OK;
+}
+
 static orb_status match_rims(orb_context *ctx, const orb_align_shape *shapes, const orb_align_options *options,
                              orb_alignment *out) {
-  if (options->preset == ORB_PRESET_FAST || (options->method != ORB_ALIGN_PIN && options->method != ORB_ALIGN_AUTO)) {
-    return ORB_OK;
-  }
   ORB_TRY(orb_align_rims(ctx, options, out));
-  const int retries = options->method == ORB_ALIGN_AUTO && out->shape_count == 2 && out->landmark_count == 0 &&
-                      out->rim_count == 0 && !is_large(shapes, 2, options);
+  const int both = orb_has_holes(shapes[0].mesh) && orb_has_holes(shapes[out->shape_count - 1].mesh);
+  const int retries = options->method == ORB_ALIGN_AUTO && options->preset != ORB_PRESET_FAST && both &&
+                      out->shape_count == 2 && out->landmark_count == 0 && out->rim_count == 0 &&
+                      !is_large(shapes, 2, options);
   return retries ? retry_at_rims(ctx, shapes, options, out) : ORB_OK;
 }
 

@@ -1,6 +1,7 @@
 /* orb_merge(): align, remesh, transfer (the reports), write. */
 #include "orbmorph/merge.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -12,6 +13,7 @@
 #include "merge/coarse.h"
 #include "merge/report.h"
 #include "mesh/refuse.h"
+#include "orbmorph/utf8.h"
 #include "transfer/holes.h"
 #include "transfer/keep.h"
 
@@ -87,14 +89,33 @@ static orb_document document_of(const orb_merge_options *options) {
   return (orb_document){options->file, options->file_bytes, options->file_size, options->file_parts};
 }
 
+/* Parts of a document are named, and the first shape has none: the error lists them. */
+static orb_status refuse_parts(orb_context *ctx, const orb_document_parts *parts) {
+  orb_status status =
+      orb_fail(ctx, ORB_E_BAD_OPTION,
+               "\"template\" names meshes or nodes, but the first shape is not glTF; leave that member out.");
+  orb_error *error = orb_context_error_edit(ctx);
+  error->shape = 0;
+  error->element_total = (int64_t)parts->mesh_count + parts->node_count;
+  for (int32_t i = 0; i < error->element_total && i < ORB_ERROR_ITEMS; i++) {
+    orb_error_element *element = &error->elements[error->element_count++];
+    if (i < parts->mesh_count) {
+      (void)snprintf(element->where, sizeof element->where, "meshes[%d]", parts->meshes[i]);
+    } else {
+      (void)snprintf(element->where, sizeof element->where, "nodes");
+      (void)orb_utf8_copy(element->name, sizeof element->name, parts->nodes[i - parts->mesh_count]);
+    }
+  }
+  return status;
+}
+
 orb_status orb_merge_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                            const orb_merge_options *options) {
   const int is_document = keeps_document(options);
   ORB_TRY(check_shapes(ctx, shapes, shape_count));
   if (!is_document && options->remesh.method == ORB_REMESH_TEMPLATE &&
       options->file_parts.mesh_count + options->file_parts.node_count > 0) {
-    return orb_fail(ctx, ORB_E_BAD_OPTION,
-                    "\"template\" names meshes or nodes, but the first shape is not glTF; leave that member out.");
+    return refuse_parts(ctx, &options->file_parts);
   }
   if (is_document) {
     orb_document document = document_of(options);
@@ -168,8 +189,8 @@ static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, in
     ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
   }
   ORB_TRY(orb_dropped_holes(ctx, &out->supermesh, &out->alignment, &options->asset,
-                            options->remesh.method == ORB_REMESH_TEMPLATE && options->file, &out->dropped,
-                            &out->dropped_count));
+                            options->remesh.method == ORB_REMESH_TEMPLATE && options->file, &out->open_holes,
+                            &out->dropped, &out->dropped_count));
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
   out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
   if (!out->transforms || !out->fits) {

@@ -446,7 +446,7 @@ orb_status orb_cycles_find(orb_surface *s, double limit, int32_t most, orb_cycle
     status = search_within(&w, limit);
   }
   if (status == ORB_OK) {
-    status = choose(&w, most, 1, out);
+    status = choose(&w, most, most <= ORB_CYCLES_LABELLED, out);
   }
   close_work(&w);
   return status;

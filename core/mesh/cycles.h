@@ -17,10 +17,14 @@ typedef struct orb_cycles {
   int32_t count;
 } orb_cycles;
 
+/* Of as many cycles labels tell whether they leave the surface connected together: they have 64 bits. */
+enum { ORB_CYCLES_LABELLED = 64 };
+
 /* Finds cycles of at most `limit`; INFINITY: of any length, and at least one on a surface with handles, unless it runs
  * over faces that repairs made. Only edges with a face of the file are used. The surface is closed, consistent and in
  * one piece, and its vertices have one fan each. The shortest cycle of the surface is among the result where its
- * length is below a finite limit. most: how many to return. The caller frees the result also on failure.
+ * length is below a finite limit. most: how many to return; above ORB_CYCLES_LABELLED, each leaves the surface
+ * connected, and orb_cycles_apart() keeps those that do so together. The caller frees the result also on failure.
  *
  * O(F log F), and for each vertex of O(√F · genus) seeds a search within limit / 2; with no limit, a few whole
  * searches. */

@@ -179,14 +179,23 @@ static orb_status cut(orb_surface *s, const orb_cycles *cycles, int fans, double
   return status;
 }
 
-/* Closes the handles that one search finds; *count: how many. */
-static orb_status close_round(orb_surface *s, double limit, double diagonal, double facing, orb_loops *done,
-                              int32_t *count) {
+/* Closes the handles that one search finds, of this genus; *count: how many. */
+static orb_status close_round(orb_surface *s, double limit, double diagonal, double facing, int64_t genus,
+                              orb_loops *done, int32_t *count) {
   orb_cycles cycles = {0};
-  double area[64];
-  int tunnel[64];
+  double *area = NULL;
+  int *tunnel = NULL;
+  const int many = genus > ORB_CYCLES_LABELLED;
   *count = 0;
-  orb_status status = orb_cycles_find(s, limit, 64, &cycles);
+  orb_status status = orb_cycles_find(s, limit, many ? INT32_MAX : ORB_CYCLES_LABELLED, &cycles);
+  if (status == ORB_OK && many) {
+    status = orb_cycles_apart(s, &cycles);
+  }
+  if (status == ORB_OK) {
+    area = ORB_NEW(s->ctx, double, cycles.count);
+    tunnel = ORB_NEW(s->ctx, int, cycles.count);
+    status = area && tunnel ? ORB_OK : ORB_E_NO_MEMORY;
+  }
   for (int32_t i = 0; i < cycles.count && status == ORB_OK; i++) {
     const orb_cycle *cycle = &cycles.cycle[i];
     tunnel[i] = is_tunnel(s, cycles.half_edges + cycle->start, cycle->count, facing);
@@ -201,6 +210,8 @@ static orb_status close_round(orb_surface *s, double limit, double diagonal, dou
     handle->filled = tunnel[i];
     handle->area_relative = area[i] / (diagonal * diagonal);
   }
+  orb_free(s->ctx, area);
+  orb_free(s->ctx, tunnel);
   orb_cycles_free(s->ctx, &cycles);
   return status;
 }
@@ -211,7 +222,7 @@ orb_status orb_surface_close_handles(orb_surface *s, double size, int64_t *genus
   orb_status status = ORB_OK;
   while (*genus > 0 && status == ORB_OK) {
     int32_t count;
-    status = close_round(s, limit * diagonal, diagonal, facing, &done, &count);
+    status = close_round(s, limit * diagonal, diagonal, facing, *genus, &done, &count);
     if (status == ORB_OK && count == 0) {
       if (limit >= size) {
         break;
@@ -280,7 +291,8 @@ orb_status orb_surface_list_handles(orb_surface *s, int64_t genus, orb_loops *ou
   int many = genus > FEW_HANDLES, rounds = many ? MANY_ROUNDS : LIST_ROUNDS;
   for (int round = 0; round < rounds && genus > 0; round++) {
     orb_cycles cycles = {0};
-    orb_status status = many ? orb_cycles_generate(s, &cycles) : orb_cycles_find(s, INFINITY, 64, &cycles);
+    orb_status status =
+        many ? orb_cycles_generate(s, &cycles) : orb_cycles_find(s, INFINITY, ORB_CYCLES_LABELLED, &cycles);
     if (status == ORB_OK && many) {
       status = orb_cycles_apart(s, &cycles);
     }

@@ -1,5 +1,6 @@
 #include "transfer/holes.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #include "base/check.h"
@@ -11,6 +12,11 @@
 /* Area of a group of slivers, as a share of the surface. The coordinates of an asset are rounded by 6e-8, so a group
  * with less is no higher than rounding. */
 static const double SLIVER = 1e-8;
+
+/* A triangle of this height on the unit sphere is flat but for rounding: its corners lie on one arc. */
+static const double FLAT = 1e-10;
+
+enum { FLAT_MOST = 64 }; /* flat triangles beside each other; a guard */
 
 typedef struct grouping {
   const orb_supermesh *supermesh;
@@ -31,6 +37,36 @@ static double area_of(const grouping *g, int32_t t) {
     orb_place_position(g->mesh, &g->supermesh->places[v[k]], p[k]);
   }
   return orb_triangle_area(p[0], p[1], p[2]);
+}
+
+/* The half-edge of t opposite to the corner between the two others, if t is flat; −1. */
+static int32_t across_flat(const orb_supermesh *m, int32_t t) {
+  const double *p[3];
+  double most = 0;
+  int longest = 0;
+  for (int k = 0; k < 3; k++) {
+    p[k] = m->points + 3 * (int64_t)m->triangles[3 * (int64_t)t + k];
+  }
+  for (int k = 0; k < 3; k++) {
+    const double length2 = orb_distance2(p[k], p[(k + 1) % 3]);
+    longest = length2 > most ? k : longest;
+    most = fmax(most, length2);
+  }
+  return orb_det(p[0], p[1], p[2]) < FLAT * sqrt(most) ? 3 * t + longest : -1;
+}
+
+/* Of three vertices on one stretch of a rim, the outer two are joined by a chord, and the rim runs along the other two
+ * edges of their triangle: it lies on the side of the triangle across the chord. Its centre does not say so, and where
+ * another shape has a corner there, the triangle is not flat on that shape. */
+static void settle_flat(const grouping *g) {
+  for (int32_t t = 0; t < g->supermesh->triangle_count; t++) {
+    int32_t at = t, h = across_flat(g->supermesh, t);
+    for (int i = 0; i < FLAT_MOST && h >= 0; i++) {
+      at = g->twin[h] / 3;
+      h = across_flat(g->supermesh, at);
+    }
+    g->home[t] = h < 0 ? g->home[at] : g->home[t];
+  }
 }
 
 /* Gathers the triangles that edges join to t on its side of the rims. Returns how many; *area: theirs; *beside: the
@@ -70,6 +106,7 @@ orb_status orb_holes_settle(orb_context *ctx, const orb_supermesh *supermesh, co
     goto end;
   }
   ORB_GO(status, orb_mesh_twins(ctx, supermesh->triangles, count, supermesh->vertex_count, g.twin), end);
+  settle_flat(&g);
   for (int32_t t = 0; t < count; t++) {
     all += area_of(&g, t);
   }
@@ -125,10 +162,18 @@ done:
 }
 
 orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, const orb_alignment *alignment,
-                             const orb_asset_options *options, int is_file, orb_dropped **list, int32_t *count) {
+                             const orb_asset_options *options, int is_file, int32_t *open, orb_dropped **list,
+                             int32_t *count) {
   const orb_aligned_shape *shapes = alignment->shapes;
   const int first = orb_has_holes(&shapes[0].mesh);
   const int is_open = first && (is_file || (options->holes == ORB_HOLES_REOPEN && supermesh->has_rims));
+  *open = 0;
+  if (is_open) {
+    orb_hole_list holes;
+    ORB_TRY(orb_holes_find(ctx, &shapes[0].mesh, &holes));
+    *open = holes.count;
+    orb_holes_free(ctx, &holes);
+  }
   if (first && !is_open && options->holes == ORB_HOLES_REOPEN) {
     ORB_TRY(orb_dropped_add(ctx, list, count, "holes", "shapes[0]",
                             "Their rims could not be made edges, so they stay filled; the methods overlay and template "

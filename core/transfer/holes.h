@@ -11,11 +11,11 @@
 ORB_MUST_CHECK orb_status orb_holes_settle(orb_context *ctx, const orb_supermesh *supermesh, const orb_mesh *mesh,
                                            int32_t *home);
 
-/* Adds to the list what the asset lacks for its holes: those of the first shape that stay filled, and what is open on
- * the first shape or on a later one only, by the alignment's matches of rims. is_file: the triangles of the asset are
- * those of the first shape's file. */
+/* Counts the filled holes of the first shape that are open in the asset, and adds to the list what the asset lacks for
+ * its holes: those of the first shape that stay filled, and what is open on the first shape or on a later one only, by
+ * the alignment's matches of rims. is_file: the triangles of the asset are those of the first shape's file. */
 ORB_MUST_CHECK orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh,
                                             const orb_alignment *alignment, const orb_asset_options *options,
-                                            int is_file, orb_dropped **list, int32_t *count);
+                                            int is_file, int32_t *open, orb_dropped **list, int32_t *count);
 
 #endif

@@ -57,7 +57,7 @@ _orbmorph() {
       words="--server --json --quiet --help "
       ;;
     view)
-      words="--help --output --poses --size --up --yaw --pitch --wire --inside --frames "
+      words="--quiet --help --output --poses --size --up --yaw --pitch --wire --inside --frames "
       ;;
     sign)
       words="--help --key --expires "

@@ -110,6 +110,7 @@ complete -c orbmorph -n '__fish_seen_subcommand_from doctor' -l json -d 'print t
 complete -c orbmorph -n '__fish_seen_subcommand_from doctor' -l quiet -s q -d 'print no progress and no notes'
 complete -c orbmorph -n '__fish_seen_subcommand_from doctor' -l help -s h -d 'show this help'
 complete -c orbmorph -n __fish_use_subcommand -f -a view -d 'Draw poses of a morph into a PNG file, without the daemon'
+complete -c orbmorph -n '__fish_seen_subcommand_from view' -l quiet -s q -d 'print no progress and no notes'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l help -s h -d 'show this help'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l output -s o -r -d 'write the result to FILE, whose ending must fit; - is standard output'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l poses -r -d 'poses in each row; default: 5'

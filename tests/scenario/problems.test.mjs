@@ -220,6 +220,11 @@ test('details read as sentences, with numbers as people write them', async (t) =
     ],
     [
       '/v1/supermeshes',
+      { ...two, remesh: { max_triangles: 3 } },
+      '"max_triangles" in "remesh" must be at least 4, as many as a tetrahedron has, or 0 for no limit.',
+    ],
+    [
+      '/v1/supermeshes',
       { ...two, landmarks: [{ at: [{ vertex: 0 }] }] },
       'Landmark 0: "at" must list one place for each of the 2 shapes.',
     ],

@@ -290,8 +290,10 @@ test('a request names the meshes or nodes that are the surface', async (t) => {
   }
   for (const template of ['body', { meshes: 1 }, { meshes: [-1] }, { meshes: [0.5] }, { nodes: [''] }])
     assertProblem(await d.post('/v1/supermeshes', { ...request, template }), 422, 'invalid-request');
-  const obj = { ...request, shapes: [...request.shapes].reverse(), template: { meshes: [0] } };
-  assert.match((await d.make('/v1/supermeshes', obj)).problem.detail, /the first shape is not glTF/);
+  const obj = { ...request, shapes: [...request.shapes].reverse(), template: { meshes: [0], nodes: ['body'] } };
+  const { problem } = await d.make('/v1/supermeshes', obj);
+  assert.match(problem.detail, /the first shape is not glTF/);
+  assert.deepEqual([problem.shape, problem.elements], [0, [{ where: 'meshes[0]' }, { where: 'nodes', name: 'body' }]]);
 });
 
 test('the surface has a mesh that the request does not name', async (t) => {

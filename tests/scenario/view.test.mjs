@@ -218,11 +218,11 @@ const turns = {
 };
 
 /** That a mesh whose y axis points up looks as high and wide under all turns, without --up. */
-async function assertUpright(t, mesh, what) {
+async function assertUpright(t, mesh, what, keys = ['pixels', 'width', 'height']) {
   const upright = outline(await drawAsIs(t, still(mesh), '--up', 'y'));
   for (const [name, turn] of Object.entries({ 'y up': (p) => p, ...turns })) {
     const seen = outline(await drawAsIs(t, still(mesh, turn)));
-    for (const key of ['pixels', 'width', 'height'])
+    for (const key of keys)
       assert.ok(
         Math.abs(seen[key] - upright[key]) < 0.08 * upright[key],
         `${what}, ${name}: ${JSON.stringify([seen, upright])}`,
@@ -275,6 +275,34 @@ for (const name of ['ada-sit', 'ben-crouch', 'dan-run', 'emmy-armsup'])
   test(`view shows ${name} upright`, { skip: !real.there }, async (t) => {
     const file = path.join(real.folder, 'posed', `${name}.obj`);
     await assertUpright(t, parse(await readFile(file, 'utf8')), name);
+  });
+
+/** A bust: an egg without its lower part, on a flat base. */
+function bust() {
+  const egg = ball(4, ([x, y, z]) => [x * (1 - 0.2 * y), 1.6 * y, 0.9 * z + (y > 0 && z > 0 ? 0.2 * y * z : 0)]);
+  return { ...egg, positions: egg.positions.map(([x, y, z]) => [x, Math.max(y, -0.8), z]) };
+}
+
+test('view shows what has a flat base upright, and says why', async (t) => {
+  await assertUpright(t, bust(), 'bust');
+  const cwd = await folder(t);
+  const said = async (glb, ...options) => {
+    await writeFile(path.join(cwd, 'in.glb'), glb);
+    return (await run(['view', 'in.glb', ...options], { cwd })).err;
+  };
+  const turned = still(bust(), turns['z up']);
+  assert.match(await said(turned), /^z points up, .*: it has a flat base; --up y shows it as in glTF\n$/);
+  assert.equal(await said(turned, '-q'), '');
+  assert.equal(await said(turned, '--up', 'z'), '');
+  assert.equal(await said(still(bust())), '');
+  assert.match(await said(still(ball(3))), /^nothing in the first shape tells which way is up/);
+});
+
+for (const name of ['penguin', 'nefertiti_70k'])
+  test(`view shows ${name} upright`, { skip: !real.there }, async (t) => {
+    const file = path.join(real.folder, 'good', `${name}.obj`);
+    // which side shows depends on where its front is
+    await assertUpright(t, parse(await readFile(file, 'utf8')), name, ['height']);
   });
 
 test('view shows animals upright whatever axis points up in their file', async (t) => {

@@ -203,5 +203,6 @@ test('two open shapes are mended, and morph from rim to rim', async () => {
     /bust1 rim of hole 1 to rim of hole 1/,
   );
   assert.equal(await page.getByText('Not in the asset').count(), 0);
+  assert.match(await page.locator('tr', { hasText: 'Closed, genus' }).innerText(), /open at 1 hole, 0/);
   await done();
 });

@@ -446,6 +446,27 @@ static void test_torus(void **state) {
   orb_mesh_free(ctx, &ring);
 }
 
+/* More handles than labels have bits are closed together, each along one of the shortest loops: the squares of the
+ * holes, and the bars between them. */
+static void test_many_closed(void **state) {
+  (void)state;
+  enum { HOLES = 600 };
+  const orb_repair_options options = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = 1};
+  size_t size;
+  char *text = handles_plate(HOLES, &size);
+  orb_mesh plate = read_text(text, size);
+  assert_int_equal(orb_mesh_repair_with(ctx, &plate, &options), ORB_OK);
+  assert_int_equal(plate.handle_count, HOLES);
+  assert_int_equal(plate.triangle_count, 2 * plate.vertex_count - 4);
+  int longer = 0;
+  for (int32_t i = 0; i < plate.handle_count; i++) {
+    assert_true(plate.handles[i].area_relative > 0);
+    longer += plate.handles[i].count > 4;
+  }
+  assert_true(longer < HOLES / 20); /* where neighbours have taken all vertices around a hole */
+  orb_mesh_free(ctx, &plate);
+}
+
 /* Small handles are closed and a large one stays; its loop is reported. */
 static void test_mixed(void **state) {
   (void)state;
@@ -489,9 +510,10 @@ static void test_memory(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals), cmocka_unit_test(test_refused),
-      cmocka_unit_test(test_torus),   cmocka_unit_test(test_many),    cmocka_unit_test(test_mixed),
-      cmocka_unit_test(test_memory),  cmocka_unit_test(test_scans),   cmocka_unit_test(test_real_refused)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals),
+                                     cmocka_unit_test(test_refused), cmocka_unit_test(test_torus),
+                                     cmocka_unit_test(test_many),    cmocka_unit_test(test_many_closed),
+                                     cmocka_unit_test(test_mixed),   cmocka_unit_test(test_memory),
+                                     cmocka_unit_test(test_scans),   cmocka_unit_test(test_real_refused)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -240,7 +240,7 @@ export type SupermeshRequest = {
     method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
     /** The largest deviation, relative to the diagonal of the bounding box. Default: 0.001. */
     tolerance?: number;
-    /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. Default: 0. */
+    /** The largest number of triangles, at least 4; 0 sets no limit. It takes precedence over tolerance. Default: 0. */
     max_triangles?: number;
   };
   asset?: {
@@ -313,7 +313,7 @@ export type CanonicalRequest = {
     method: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
     /** The largest deviation, relative to the diagonal of the bounding box. */
     tolerance: number;
-    /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. */
+    /** The largest number of triangles, at least 4; 0 sets no limit. It takes precedence over tolerance. */
     max_triangles: number;
   };
   asset: {
@@ -542,6 +542,8 @@ export type Supermesh = {
     /** The reason. */
     why: string;
   }>;
+  /** How many holes of the first shape are open in the asset. Only if there are any. The certificate is about the common mesh, in which they are filled. */
+  open_holes?: number;
   /** Filled holes of the first shape and of a later one that correspond: the rims lie on each other. Only if there are any; `dropped` names the other holes. Holes are numbered from 1, in the order in which they were filled. */
   rims?: Array<{
     /** The later shape. */

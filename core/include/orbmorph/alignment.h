@@ -118,7 +118,7 @@ typedef struct orb_alignment {
   int32_t suspect_count; /* at most ORB_SUSPECTS_MAX, by falling distance */
   orb_suspect *suspects;
   int32_t rim_count;
-  orb_rim_match *rims; /* by rising number of the shape; pin and auto with a composed map */
+  orb_rim_match *rims; /* by rising number of the shape */
 } orb_alignment;
 
 /* Frees the arrays and zeroes the struct. */

@@ -118,6 +118,7 @@ typedef struct orb_merge_result {
   orb_fit_report *fits;    /* shape_count */
   int32_t dropped_count;
   orb_dropped *dropped; /* see orb_asset_dropped() */
+  int32_t open_holes;   /* filled holes of the first shape that are open in the asset */
   orb_buffer asset;
   int is_document; /* the asset is the document of the first shape, see orb_asset_write_document() */
   int32_t carried_count;

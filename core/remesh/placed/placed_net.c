@@ -57,8 +57,62 @@ void orb_placed_free(orb_context *ctx, orb_placed_net *placed) {
   orb_free(ctx, placed->item_shape);
   orb_free(ctx, placed->vertex_items);
   orb_free(ctx, placed->triangle_items);
+  orb_free(ctx, placed->kept_first);
+  orb_free(ctx, placed->kept_to);
+  orb_free(ctx, placed->kept_next);
   orb_net_free(ctx, &placed->net);
   memset(placed, 0, sizeof *placed);
+}
+
+/* Room for the kept edges of n vertices: each that splits one needs two entries. */
+static orb_status reserve_kept(orb_context *ctx, orb_placed_net *placed, size_t n, size_t before) {
+  const size_t entries = (size_t)placed->kept_given + 2 * n;
+  if (!orb_regrow(ctx, &placed->kept_first, n, sizeof(int32_t)) ||
+      !orb_regrow(ctx, &placed->kept_to, entries, sizeof(int32_t)) ||
+      !orb_regrow(ctx, &placed->kept_next, entries, sizeof(int32_t))) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(placed->kept_first + before, -1, (n - before) * sizeof(int32_t));
+  return ORB_OK;
+}
+
+static void keep_from(orb_placed_net *placed, int32_t v, int32_t w) {
+  placed->kept_to[placed->kept_count] = w;
+  placed->kept_next[placed->kept_count] = placed->kept_first[v];
+  placed->kept_first[v] = placed->kept_count++;
+}
+
+orb_status orb_placed_keep(orb_context *ctx, orb_placed_net *placed, const int32_t (*ends)[2], int64_t count) {
+  placed->kept_given = (int32_t)(2 * count);
+  ORB_TRY(reserve_kept(ctx, placed, (size_t)placed->capacity, 0));
+  for (int64_t i = 0; i < count; i++) {
+    keep_from(placed, ends[i][0], ends[i][1]);
+    keep_from(placed, ends[i][1], ends[i][0]);
+  }
+  return ORB_OK;
+}
+
+/* The entry of v's list that says w, −1. */
+static int32_t kept_entry(const orb_placed_net *placed, int32_t v, int32_t w) {
+  int32_t i = placed->kept_first ? placed->kept_first[v] : -1;
+  while (i >= 0 && placed->kept_to[i] != w) {
+    i = placed->kept_next[i];
+  }
+  return i;
+}
+
+int orb_placed_keeps(const orb_placed_net *placed, int32_t h) {
+  return kept_entry(placed, placed->net.triangles[h], placed->net.triangles[placed->net.twin[h]]) >= 0;
+}
+
+/* n has split the edge of a and b. */
+static void keep_halves(orb_placed_net *placed, int32_t a, int32_t b, int32_t n) {
+  const int32_t forth = kept_entry(placed, a, b), back = kept_entry(placed, b, a);
+  if (forth >= 0 && back >= 0) {
+    placed->kept_to[forth] = placed->kept_to[back] = n;
+    keep_from(placed, n, a);
+    keep_from(placed, n, b);
+  }
 }
 
 orb_status orb_placed_reserve(orb_context *ctx, orb_placed_net *placed, int64_t more) {
@@ -87,6 +141,9 @@ orb_status orb_placed_reserve(orb_context *ctx, orb_placed_net *placed, int64_t 
     memset(placed->no_repair + 4 * i, 0, 4 * sizeof *placed->no_repair);
     placed->not_inverted[2 * i] = placed->not_inverted[2 * i + 1] = 0;
     memset(placed->within + 6 * i, 0, 6 * sizeof *placed->within);
+  }
+  if (placed->kept_first) {
+    ORB_TRY(reserve_kept(ctx, placed, n, (size_t)placed->capacity));
   }
   placed->capacity = (int32_t)n;
   return ORB_OK;
@@ -356,10 +413,12 @@ int32_t orb_placed_split(orb_placed_net *placed, int32_t h, const double p[3]) {
   int32_t g = placed->net.twin[h];
   int32_t lists[2] = {placed->triangle_items[h / 3], placed->triangle_items[g / 3]};
   int32_t beside = placed->net.triangles[h]; /* read before the split, which may put the new vertex here */
+  const int32_t other = placed->net.triangles[g];
   int32_t v = orb_net_split_edge(&placed->net, h, p);
   if (v < 0) {
     return -1;
   }
+  keep_halves(placed, beside, other, v);
   for (int32_t s = 0; s < placed->shape_count; s++) {
     int32_t near = placed->spot[(int64_t)beside * placed->shape_count + s].h / 3;
     orb_placed_locate(placed, v, s, near);
@@ -377,9 +436,13 @@ int32_t orb_placed_insert(orb_placed_net *placed, int32_t t, const double p[3]) 
   orb_hit hit = orb_walk(&view, p, t);
   int32_t edge = orb_hit_edge(&hit), other = edge >= 0 ? net->twin[edge] / 3 : -1;
   int32_t lists[2] = {placed->triangle_items[hit.triangle], other >= 0 ? placed->triangle_items[other] : -1};
+  const int32_t ends[2] = {edge >= 0 ? net->triangles[edge] : -1, edge >= 0 ? net->triangles[net->twin[edge]] : -1};
   int32_t near = hit.triangle, before = net->vertex_count, v = orb_net_insert(net, p, &near);
   if (v < before) { /* p is a vertex already */
     return v;
+  }
+  if (edge >= 0) {
+    keep_halves(placed, ends[0], ends[1], v);
   }
   for (int32_t s = 0; s < placed->shape_count; s++) {
     orb_placed_locate(placed, v, s,

@@ -34,6 +34,10 @@ typedef struct orb_placed_net {
   int32_t *item_shape;
   int32_t *vertex_items, *triangle_items; /* heads of the lists, −1: empty */
   int gave_up;                            /* refinement stopped early, see orb_placed_refine() */
+  /* Edges that stay, see orb_placed_keep(): lists of the other ends. NULL: there are none. */
+  int32_t *kept_first; /* per net vertex: head of its list, −1: empty */
+  int32_t *kept_to, *kept_next;
+  int32_t kept_count, kept_given; /* entries; of them, those of the edges given */
 } orb_placed_net;
 
 /* Starts from the shape with the most triangles and inserts the vertices of the other shapes. */
@@ -58,6 +62,12 @@ static inline const double *orb_placed_normal(const orb_placed_net *placed, int3
 /* The item's point on the sphere, and its position in space divided by the shape's diagonal. */
 const double *orb_placed_item_point(const orb_placed_net *placed, int32_t item);
 const double *orb_placed_item_position(const orb_placed_net *placed, int32_t item);
+
+/* Refinement never flips these edges; the halves of one that is split stay as well. Call it once. */
+ORB_MUST_CHECK orb_status orb_placed_keep(orb_context *ctx, orb_placed_net *placed, const int32_t (*ends)[2],
+                                          int64_t count);
+/* Whether the edge of h stays. */
+int orb_placed_keeps(const orb_placed_net *placed, int32_t h);
 
 /* Splits net edge h at p if all four triangles stay positive, and assigns the items of the two triangles again. Returns
  * the new vertex, or −1. Needs room for one vertex. */

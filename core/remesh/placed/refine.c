@@ -36,7 +36,8 @@ static int force_flip(orb_placed_net *placed, int32_t h) {
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
   const double *p = orb_net_point(net, a), *q = orb_net_point(net, b);
   const double *r = orb_net_point(net, c), *s = orb_net_point(net, d);
-  if (c == d || orb_net_adjacent(net, c, d) || orb_orient(r, s, q) <= 0 || orb_orient(s, r, p) <= 0) {
+  if (orb_placed_keeps(placed, h) || c == d || orb_net_adjacent(net, c, d) || orb_orient(r, s, q) <= 0 ||
+      orb_orient(s, r, p) <= 0) {
     return 0;
   }
   orb_placed_flip(placed, h);
@@ -57,7 +58,7 @@ static int repair_by_flip(orb_placed_net *placed, int32_t h, double limit2) {
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
   orb_form before, after;
   forms_of_flip(placed, v, w, c, d, &before, &after);
-  if (!orb_net_can_flip(net, h) || !orb_form_allows(before, after) ||
+  if (orb_placed_keeps(placed, h) || !orb_net_can_flip(net, h) || !orb_form_allows(before, after) ||
       !orb_placed_edge_is_within(placed, c, d, limit2) || orb_placed_flip_items2(placed, h) > limit2) {
     return 0;
   }

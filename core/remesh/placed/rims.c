@@ -5,12 +5,14 @@
 
 #include "base/check.h"
 #include "base/context.h"
+#include "base/grow.h"
 #include "base/memory.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "remesh/placed/bound.h"
 #include "remesh/placed/export.h"
 #include "remesh/placed/placed_net.h"
+#include "remesh/placed/refine.h"
 
 /* If a vertex lies this near to the point where a rim crosses one of its edges, as a share of the edge, it moves there:
  * a new vertex beside it would make slivers. */
@@ -18,7 +20,7 @@ static const double NEAR = 0.05;
 /* A vertex this near to a rim, on the unit sphere, lies on it: rounding of its point explains the distance. */
 static const double ON = 1e-12;
 
-enum { ROUNDS = 24 }; /* of splits; each halves the edges that deviate, so a few rounds suffice */
+enum { REFINEMENTS = 32 }; /* after this many, refinement counts as unable to finish the net */
 
 /* A vertex this near to the opposite edge of its triangle makes a needle, across which nothing can be traced. The edge
  * is flipped. */
@@ -33,7 +35,9 @@ typedef struct rims {
   int32_t old_count;    /* vertices before */
   int32_t *vertex_of;   /* per vertex of the first shape: its net vertex, −1 */
   unsigned char *fixed; /* per old vertex: it must not move */
-  int failed;           /* an edge could not be made */
+  int32_t (*edges)[2];  /* of which the rims consist */
+  int64_t edge_count, edge_room;
+  int failed; /* an edge could not be made */
 } rims;
 
 static int is_rim(const orb_remesh_job *job, int32_t h) {
@@ -245,6 +249,18 @@ static int32_t step(rims *r, int32_t v, int32_t w) {
   return orb_net_split_edge(net, crossed, x);
 }
 
+static orb_status add_edge(rims *r, int32_t v, int32_t w) {
+  if (r->edge_count == r->edge_room) {
+    r->edge_room = 2 * r->edge_room + 256;
+    if (!orb_regrow(r->ctx, &r->edges, (size_t)r->edge_room, sizeof *r->edges)) {
+      return ORB_E_NO_MEMORY;
+    }
+  }
+  r->edges[r->edge_count][0] = v;
+  r->edges[r->edge_count++][1] = w;
+  return ORB_OK;
+}
+
 /* Makes the arc from v to w a chain of edges. */
 static orb_status trace(rims *r, int32_t v, int32_t w) {
   for (int64_t steps = 0; v != w; steps++) {
@@ -254,9 +270,21 @@ static orb_status trace(rims *r, int32_t v, int32_t w) {
       r->failed = 1;
       return ORB_OK;
     }
+    if (next != v) {
+      ORB_TRY(add_edge(r, v, next));
+    }
     v = next;
   }
   return orb_context_check(r->ctx);
+}
+
+/* A rim that was traced later may have changed the edges of another one. */
+static int are_edges(const rims *r) {
+  int all = 1;
+  for (int64_t i = 0; i < r->edge_count && all; i++) {
+    all = orb_net_edge(&r->net, r->edges[i][0], r->edges[i][1]) >= 0;
+  }
+  return all;
 }
 
 static orb_status trace_all(rims *r) {
@@ -266,6 +294,7 @@ static orb_status trace_all(rims *r) {
       ORB_TRY(trace(r, r->vertex_of[mesh->triangles[h]], r->vertex_of[mesh->triangles[orb_next(h)]]));
     }
   }
+  r->failed |= !are_edges(r);
   return ORB_OK;
 }
 
@@ -278,47 +307,15 @@ static int is_within(const orb_remesh_job *job, const double *bound) {
   return 1;
 }
 
-/* Splits the edges beyond the limit and inserts such items, once each. Nothing is flipped, so the rims stay. *changes:
- * how many. */
-static orb_status split_once(rims *r, orb_placed_net *placed, double limit2, int64_t *changes) {
-  const int32_t half_edges = 3 * placed->net.triangle_count;
-  *changes = 0;
-  for (int32_t h = 0; h < half_edges; h++) {
-    int32_t v = placed->net.triangles[h], w = placed->net.triangles[orb_next(h)];
-    if (placed->net.twin[h] < h || orb_placed_edge_is_within(placed, v, w, limit2)) {
-      continue;
-    }
-    double middle[3];
-    for (int k = 0; k < 3; k++) {
-      middle[k] = orb_net_point(&placed->net, v)[k] + orb_net_point(&placed->net, w)[k];
-    }
-    orb_normalize(middle);
-    ORB_TRY(orb_placed_reserve(r->ctx, placed, 1));
-    *changes += orb_placed_split(placed, h, middle) >= 0;
-  }
-  for (int32_t t = 0; t < half_edges / 3; t++) {
-    const int32_t *c = placed->net.triangles + 3 * (int64_t)t;
-    int32_t item = placed->triangle_items[t];
-    while (item >= 0 && orb_placed_item2(placed, item, c[0], c[1], c[2]) <= limit2) {
-      item = placed->item_next[item];
-    }
-    if (item >= 0) {
-      ORB_TRY(orb_placed_reserve(r->ctx, placed, 1));
-      (void)orb_placed_insert(placed, t, orb_placed_item_point(placed, item));
-      ++*changes;
-    }
-  }
-  return orb_context_check(r->ctx);
-}
-
-/* Computes the places of the net. Where the supermesh was within the tolerance, edges are split until the net is, too;
- * failed if that does not end. */
+/* Computes the places of the net. Where the supermesh was within the tolerance, refines the net, but for the rims,
+ * until it is, too; failed if that does not end. */
 static orb_status place(rims *r, int keeps_tolerance, double *bound, orb_placed_net *placed) {
   const double limit = orb_remesh_limit(r->job);
-  int64_t changes = keeps_tolerance;
+  int64_t deviating = keeps_tolerance;
   ORB_TRY(orb_placed_create_on(r->ctx, r->job, &r->net, placed));
-  for (int round = 0; round < ROUNDS && changes > 0; round++) {
-    ORB_TRY(split_once(r, placed, limit * limit, &changes));
+  ORB_TRY(orb_placed_keep(r->ctx, placed, (const int32_t(*)[2])r->edges, r->edge_count));
+  for (int i = 0; i < REFINEMENTS && deviating > 0 && !placed->gave_up; i++) {
+    ORB_TRY(orb_placed_refine(r->ctx, placed, limit * limit, &deviating));
   }
   ORB_TRY(orb_placed_bounds(r->ctx, placed, bound));
   r->failed = keeps_tolerance && !is_within(r->job, bound);
@@ -375,5 +372,6 @@ done:
   orb_net_free(ctx, &r.net);
   orb_free(ctx, r.vertex_of);
   orb_free(ctx, r.fixed);
+  orb_free(ctx, r.edges);
   return status;
 }

@@ -273,7 +273,12 @@ export function MorphInspector() {
           <tr>
             <th scope="row">Closed, genus</th>
             <td>
-              {supermesh.certificate?.closed ? 'yes' : 'no'}, {supermesh.certificate?.genus}
+              {supermesh.open_holes
+                ? `open at ${supermesh.open_holes} ${supermesh.open_holes === 1 ? 'hole' : 'holes'}`
+                : supermesh.certificate?.closed
+                  ? 'yes'
+                  : 'no'}
+              , {supermesh.certificate?.genus}
             </td>
           </tr>
           <tr>

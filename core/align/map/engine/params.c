@@ -157,7 +157,23 @@ static const orb_map_params DEFAULTS = {
                 .step_sweeps = 10,
                 .descents = 6,
                 .gain = 2e-3,
-                .kept_gain = 3e-3}};
+                .kept_gain = 3e-3},
+    .rims = {.longer = 4,
+             .longer_alone = 8,
+             .apart = 0.16,
+             .slowest = 0.5,
+             .fastest = 2,
+             .one = 0.3,
+             .stiffness = {1, 10, 100},
+             .met_share = 0.8,
+             .met = 0.005,
+             .paid_times = 2,
+             .paid_more = 2,
+             .paid_less = 0.7,
+             .worst = 5,
+             .turn_cost = 0.1,
+             .retry_times = 2,
+             .retry_more = 1}};
 
 orb_map_params orb_map_params_of(orb_preset preset) {
   const double soft_below = 0.05;

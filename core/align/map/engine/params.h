@@ -346,6 +346,28 @@ typedef struct orb_map_params {
     double gain;         /* of the energy, relative: a descent that gains less is the last */
     double kept_gain;    /* of the area halfway: less does not show in a morph */
   } untwist;
+
+  /* Rims of filled holes that correspond (rims/). */
+  struct {
+    double longer;       /* rims that correspond differ in length by this factor at most, relative to the diagonals; */
+    double longer_alone; /* the same for shapes of one hole each */
+    double apart;        /* how far such rims are apart at most, as a share of their length: the radius of a circle */
+    double slowest;      /* least */
+    double fastest;      /* and most that one rim advances where the other advances by 1, both of length 1 */
+    double one;          /* vertices of both rims that are nearer than this share of all edges there are one point: a
+                            shorter edge would be a needle */
+    double stiffness[3]; /* of the springs: the next is tried where the last leaves rims too far apart to be pinned */
+    double met_share;    /* springs have brought rims together where this share of the points */
+    double met;          /* is this near to a rim, of the diagonal */
+    double paid_times;  /* most that is paid for rims that are pinned, as energy above 1: this multiple of what there */
+    double paid_more;   /* was, and this much more. What fills the holes counts too, and hardly matters */
+    double paid_less;   /* the same where only springs hold them */
+    double worst;       /* energy of a map that is caught: whether rims meet under it says nothing */
+    double turn_cost;   /* of half a turn in space, squared, against the squared distance of two rims in their mean
+                           radius: files usually have shapes upright, and circles fit under any turn */
+    double retry_times; /* a map from another start, which brings rims together where the search has not, may have */
+    double retry_more;  /* this multiple of the energy above 1, and this much more */
+  } rims;
 } orb_map_params;
 
 /* The values for a preset. `fast` composes no map; if it composes a coarse copy, it uses the values of `default`. */

@@ -9,10 +9,6 @@
 
 enum { SAMPLES = 96 }; /* of a rim: a multiple of ORB_RIMS_ALONE */
 
-/* What a rotation in space costs, by half a turn squared, against the squared distance of the rims in their mean
- * radius: files usually have shapes upright. Circles fit under any turn. */
-static const double TURN_COST = 0.1;
-
 typedef struct rim {
   orb_place place[SAMPLES];
   double at[SAMPLES][3]; /* around their mean, of mean squared length 1 */
@@ -46,7 +42,7 @@ static void sample(const orb_mesh *mesh, const orb_hole_list *holes, const orb_h
 }
 
 /* How badly the rims fit if sample i of the first one goes to sample i + turn of the second one. */
-static double cost_of(const rim rims[2], int turn) {
+static double cost_of(double turn_cost, const rim rims[2], int turn) {
   double h[9] = {0}, r[9], sum = 0;
   for (int i = 0; i < SAMPLES; i++) {
     orb_add_outer(h, rims[0].at[i], rims[1].at[(i + turn) % SAMPLES], 1);
@@ -62,7 +58,7 @@ static double cost_of(const rim rims[2], int turn) {
     }
   }
   const double angle = acos(fmin(fmax(0.5 * (r[0] + r[4] + r[8] - 1), -1), 1)) / M_PI;
-  return sum + TURN_COST * angle * angle;
+  return sum + turn_cost * angle * angle;
 }
 
 /* The only hole of a list; NULL: there is none, or there are several. */
@@ -70,8 +66,8 @@ static const orb_hole *only(const orb_hole_list *holes) {
   return holes->count == 1 && holes->of[0].is_simple && holes->of[0].length > 0 ? holes->of : NULL;
 }
 
-orb_status orb_rims_alone(orb_context *ctx, const orb_align_shape shapes[2], orb_place at[2 * ORB_RIMS_ALONE],
-                          int *found) {
+orb_status orb_rims_alone(orb_context *ctx, const orb_map_params *params, const orb_align_shape shapes[2],
+                          orb_place at[2 * ORB_RIMS_ALONE], int *found) {
   orb_hole_list holes[2] = {0};
   rim rims[2];
   orb_status status;
@@ -87,7 +83,7 @@ orb_status orb_rims_alone(orb_context *ctx, const orb_align_shape shapes[2], orb
     sample(shapes[s].mesh, &holes[s], only(&holes[s]), &rims[s]);
   }
   for (int turn = 0; turn < SAMPLES; turn++) {
-    const double cost = cost_of(rims, turn);
+    const double cost = cost_of(params->rims.turn_cost, rims, turn);
     best = cost < least ? turn : best;
     least = fmin(least, cost);
   }

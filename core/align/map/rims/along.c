@@ -15,11 +15,6 @@ enum {
   LEAST_ROUNDS = 8,  /* of smoothing: a vertex may be nearest to a wrong stretch of the rim */
   MOST_ROUNDS = 8192 /* after which the difference is constant */
 };
-/* Least and most that the second rim may advance where the first one advances by 1; both have a length of 1. */
-static const double SLOWEST = 0.5, FASTEST = 2;
-/* Two vertices of the rims are one point if they are nearer than this share of all edges there: a shorter edge would be
- * a needle. */
-static const double ONE = 0.3;
 
 /* Where the first rim goes on the second, as shares of their lengths: s ↦ s + turn + bend. */
 typedef struct course {
@@ -64,11 +59,11 @@ static double retreat(const course *c, double v) {
   return low;
 }
 
-static int keeps_order(const course *c) {
+static int keeps_order(const orb_map_params *params, const course *c) {
   const double step = 1.0 / SAMPLES;
   for (int i = 0; i < SAMPLES; i++) {
     const double way = step + c->bend[(i + 1) % SAMPLES] - c->bend[i];
-    if (way < SLOWEST * step || way > FASTEST * step) {
+    if (way < params->rims.slowest * step || way > params->rims.fastest * step) {
       return 0;
     }
   }
@@ -99,7 +94,8 @@ static void image_at(const orb_rim_side *side, const orb_hole *hole, double s, i
   }
 }
 
-static void follow_map(const orb_rim_side sides[2], const orb_hole *first, const orb_hole *second, course *out) {
+static void follow_map(const orb_map_params *params, const orb_rim_side sides[2], const orb_hole *first,
+                       const orb_hole *second, course *out) {
   double sum[2] = {0, 0};
   int32_t edge = 0;
   for (int i = 0; i < SAMPLES; i++) {
@@ -114,7 +110,7 @@ static void follow_map(const orb_rim_side sides[2], const orb_hole *first, const
   for (int i = 0; i < SAMPLES; i++) {
     out->bend[i] = wrapped(out->bend[i] - out->turn);
   }
-  for (int round = 0; round < LEAST_ROUNDS || (round < MOST_ROUNDS && !keeps_order(out)); round++) {
+  for (int round = 0; round < LEAST_ROUNDS || (round < MOST_ROUNDS && !keeps_order(params, out)); round++) {
     smooth(out);
   }
 }
@@ -141,13 +137,14 @@ static double shorter_edge(const orb_rim_side *side, const orb_hole *hole, int32
   return fmin(before, share_at(side, hole, k + 1) - share_at(side, hole, k));
 }
 
-static int are_one(const orb_rim_side sides[2], const orb_hole *const hole[2], const stop *a, const stop *b) {
+static int are_one(double one, const orb_rim_side sides[2], const orb_hole *const hole[2], const stop *a,
+                   const stop *b) {
   if (a->rim == b->rim) {
     return 0;
   }
   const stop *on[2] = {a->rim == 0 ? a : b, a->rim == 0 ? b : a};
-  return fabs(wrapped(a->s - b->s)) < ONE * shorter_edge(&sides[0], hole[0], on[0]->k) &&
-         fabs(wrapped(a->v - b->v)) < ONE * shorter_edge(&sides[1], hole[1], on[1]->k);
+  return fabs(wrapped(a->s - b->s)) < one * shorter_edge(&sides[0], hole[0], on[0]->k) &&
+         fabs(wrapped(a->v - b->v)) < one * shorter_edge(&sides[1], hole[1], on[1]->k);
 }
 
 /* The place at share s of a rim. */
@@ -176,12 +173,12 @@ static void add(orb_rim_points *points, orb_place first, orb_place second) {
 }
 
 /* Turns the stops, in their order along the first rim, into points. */
-static void write_points(const orb_rim_side sides[2], const orb_hole *const hole[2], const stop *stops, int32_t count,
-                         orb_rim_points *out) {
-  const int wraps = count > 2 && are_one(sides, hole, &stops[count - 1], &stops[0]);
+static void write_points(double nearer, const orb_rim_side sides[2], const orb_hole *const hole[2], const stop *stops,
+                         int32_t count, orb_rim_points *out) {
+  const int wraps = count > 2 && are_one(nearer, sides, hole, &stops[count - 1], &stops[0]);
   for (int32_t i = wraps; i < count; i++) {
     const stop *one = &stops[i], *next = &stops[i + 1 < count ? i + 1 : 0];
-    const int joins = i + 1 < count ? are_one(sides, hole, one, next) : wraps;
+    const int joins = i + 1 < count ? are_one(nearer, sides, hole, one, next) : wraps;
     if (joins) {
       const stop *on[2] = {one->rim == 0 ? one : next, one->rim == 0 ? next : one};
       add(out, place_of(&sides[0], hole[0], on[0]->k), place_of(&sides[1], hole[1], on[1]->k));
@@ -199,8 +196,8 @@ void orb_rim_points_free(orb_context *ctx, orb_rim_points *points) {
   memset(points, 0, sizeof *points);
 }
 
-orb_status orb_rims_along(orb_context *ctx, const orb_rim_side sides[2], const orb_rim_pair *pair, int32_t most,
-                          orb_rim_points *points) {
+orb_status orb_rims_along(orb_context *ctx, const orb_map_params *params, const orb_rim_side sides[2],
+                          const orb_rim_pair *pair, int32_t most, orb_rim_points *points) {
   const orb_hole *const hole[2] = {&sides[0].holes.of[pair->hole[0]], &sides[1].holes.of[pair->hole[1]]};
   const int all = hole[0]->count + hole[1]->count <= most;
   const int32_t step = all ? 1 : 1 + (hole[0]->count - 1) / most;
@@ -214,7 +211,7 @@ orb_status orb_rims_along(orb_context *ctx, const orb_rim_side sides[2], const o
     orb_free(ctx, stops);
     return ORB_E_NO_MEMORY;
   }
-  follow_map(sides, hole[0], hole[1], &c);
+  follow_map(params, sides, hole[0], hole[1], &c);
   for (int32_t k = 0; k < hole[0]->count; k += step) {
     const double s = share_at(&sides[0], hole[0], k);
     stops[count++] = (stop){0, k, s, fraction(advance(&c, s))};
@@ -224,7 +221,7 @@ orb_status orb_rims_along(orb_context *ctx, const orb_rim_side sides[2], const o
     stops[count++] = (stop){1, k, retreat(&c, v), v};
   }
   qsort(stops, (size_t)count, sizeof *stops, compare);
-  write_points(sides, hole, stops, count, points);
+  write_points(params->rims.one, sides, hole, stops, count, points);
   orb_free(ctx, stops);
   return ORB_OK;
 }

@@ -5,11 +5,6 @@
 #include "base/check.h"
 #include "base/memory.h"
 
-/* Lengths of rims that correspond differ at most by this factor, relative to the diagonals. */
-static const double LONGER = 4, LONGER_ALONE = 8;
-/* How far such rims are apart at most, as a share of their length: about the radius of a circle. */
-static const double APART = 0.16;
-
 /* Holes of a shape that are considered, the longest first: it bounds the time for a shape of cracks. */
 enum { MOST = 32 };
 
@@ -51,17 +46,18 @@ static int32_t longest(const orb_rim_side *side, int32_t out[MOST]) {
 }
 
 /* INFINITY: the two holes do not correspond. */
-static double cost_of(const orb_rim_side sides[2], int32_t a, int32_t b, int alone) {
+static double cost_of(const orb_map_params *params, const orb_rim_side sides[2], int32_t a, int32_t b, int alone) {
   const double lengths[2] = {length_of(&sides[0], a), length_of(&sides[1], b)};
   const double longer = fmax(lengths[0], lengths[1]) / fmin(lengths[0], lengths[1]);
-  if (!(longer <= (alone ? LONGER_ALONE : LONGER))) {
+  if (!(longer <= (alone ? params->rims.longer_alone : params->rims.longer))) {
     return INFINITY;
   }
   const double apart = 0.5 * (distance_from(&sides[0], a, &sides[1], b) + distance_from(&sides[1], b, &sides[0], a));
-  return alone || apart <= APART * 0.5 * (lengths[0] + lengths[1]) ? apart : INFINITY;
+  return alone || apart <= params->rims.apart * 0.5 * (lengths[0] + lengths[1]) ? apart : INFINITY;
 }
 
-orb_status orb_rims_pair(orb_context *ctx, const orb_rim_side sides[2], orb_rim_pair **pairs, int32_t *count) {
+orb_status orb_rims_pair(orb_context *ctx, const orb_map_params *params, const orb_rim_side sides[2],
+                         orb_rim_pair **pairs, int32_t *count) {
   int32_t hole[2][MOST], holes[2] = {longest(&sides[0], hole[0]), longest(&sides[1], hole[1])};
   const int alone = holes[0] == 1 && holes[1] == 1;
   double cost[MOST][MOST];
@@ -72,7 +68,7 @@ orb_status orb_rims_pair(orb_context *ctx, const orb_rim_side sides[2], orb_rim_
   }
   for (int32_t a = 0; a < holes[0]; a++) {
     for (int32_t b = 0; b < holes[1]; b++) {
-      cost[a][b] = cost_of(sides, hole[0][a], hole[1][b], alone);
+      cost[a][b] = cost_of(params, sides, hole[0][a], hole[1][b], alone);
     }
   }
   for (;;) {

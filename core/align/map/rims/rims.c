@@ -20,23 +20,12 @@ enum { MOST_POINTS = 1200, MOST_POINTS_OF_LARGE = 256, LEAST_POINTS_A_RIM = 16 }
 /* Points that one vertex may be beside. */
 enum { MOST_BESIDE = 3 };
 
-/* Stiffness of the springs, as in orb_map_springs: the next is tried where the last leaves rims too far apart to be
- * pinned. */
-static const double STIFFNESS[] = {1, 10, 100};
-
-/* Springs have brought rims together where this share of the points is so near to a rim, of the diagonal. */
-static const double MET_SHARE = 0.8, MET = 0.005;
-
-/* Most that is paid for rims that lie on each other, as energy above 1: a multiple of what there was, and more. What
- * fills the holes counts in an energy, and hardly matters. Less is paid where springs have not brought all together. */
-static const double PAID_TIMES = 2, PAID_MORE = 2, PAID_LESS = 0.7;
-/* Energy of a map that is caught: whether rims meet under it says nothing. */
-static const double WORST = 5;
-
 /* The base and a later shape, with points of their rims as vertices beside the landmarks of the alignment. */
 typedef struct rim_job {
   orb_context *ctx;
   orb_preset preset;
+  const orb_map_params *params;
+  int holds_landmarks;  /* those of the alignment meet, and stay together */
   int32_t count, given; /* landmarks: first `given` that the alignment holds, then points */
   orb_landmark *landmarks;
   orb_place *at;           /* 2 each */
@@ -90,7 +79,7 @@ static orb_status reserve(rim_job *job, size_t most) {
 static orb_status gather_landmarks(rim_job *job, const orb_alignment *a, int32_t s, const orb_rim_points *points) {
   const orb_aligned_shape *shapes[2] = {&a->shapes[0], &a->shapes[s]};
   ORB_TRY(reserve(job, (size_t)a->landmark_count + (size_t)points->count));
-  for (int32_t l = 0; l < a->landmark_count; l++) {
+  for (int32_t l = 0; job->holds_landmarks && l < a->landmark_count; l++) {
     orb_place *at = job->at + 2 * (size_t)job->count;
     const int32_t first = shapes[0]->landmark_vertices[l], second = shapes[1]->landmark_vertices[l];
     if (first >= 0 && second >= 0) {
@@ -216,7 +205,6 @@ static int32_t vertex_at(const orb_mesh *mesh, const orb_place *place) {
 /* Copies `moving`, with its landmarks and the vertices beside them. */
 static orb_status open_copy(rim_job *job) {
   orb_context *ctx = job->ctx;
-  const orb_map_params params = orb_map_params_of(job->preset);
   const orb_align_shape shapes[2] = {{&job->fixed.mesh, job->fixed.points}, {&job->moving.mesh, job->moving.points}};
   int32_t *ring = NULL, beside = 0;
   orb_landmark *kept = NULL;
@@ -224,8 +212,8 @@ static orb_status open_copy(rim_job *job) {
   orb_sheet sheet = {0};
   orb_status status;
   ORB_GO(status, find_ring(job, &ring, &beside), end);
-  const int32_t count = job->count + beside, keep_until = orb_map_keep_until(&params, count);
-  const int32_t size = orb_map_copy_size(&params, keep_until);
+  const int32_t count = job->count + beside, keep_until = orb_map_keep_until(job->params, count);
+  const int32_t size = orb_map_copy_size(job->params, keep_until);
   kept = ORB_NEW0(ctx, orb_landmark, count);
   at = ORB_NEW0(ctx, orb_place, 2 * (size_t)count);
   status = kept && at ? ORB_OK : ORB_E_NO_MEMORY;
@@ -309,14 +297,14 @@ static orb_status have_met(const rim_job *job, const orb_rim_side *first, int *m
     orb_locate(locator, job->moving.points + 3 * (size_t)job->second[l], -1, &place);
     orb_place_position(mesh, &place, p);
     double least = INFINITY;
-    for (int32_t i = 0; i < first->holes.count && least > MET * first->diagonal; i++) {
+    for (int32_t i = 0; i < first->holes.count && least > job->params->rims.met * first->diagonal; i++) {
       double distance;
       (void)orb_rim_nearest(first, &first->holes.of[i], p, &distance);
       least = fmin(least, distance);
     }
-    near += least <= MET * first->diagonal;
+    near += least <= job->params->rims.met * first->diagonal;
   }
-  *met = near >= MET_SHARE * job->count;
+  *met = near >= job->params->rims.met_share * job->count;
   orb_locator_destroy(job->ctx, locator);
   return ORB_OK;
 }
@@ -340,9 +328,10 @@ static orb_status bring_together(rim_job *job, const orb_rim_side *first) {
   const int32_t *second = job->is_large ? job->of_copy : job->second;
   const orb_map_guide draw = {.from = ORB_MAP_FROM_SPRINGS}, ease = {.from = ORB_MAP_FROM_PINS};
   int drawn, pinned = 0, eased;
+  const orb_map_params *params = job->params;
   double stiffness = 0;
-  for (size_t i = 0; i < sizeof STIFFNESS / sizeof *STIFFNESS && !pinned; i++) {
-    stiffness = STIFFNESS[i];
+  for (size_t i = 0; i < sizeof params->rims.stiffness / sizeof stiffness && !pinned; i++) {
+    stiffness = params->rims.stiffness[i];
     ORB_TRY(compose(job, moving, second, SPRINGS, stiffness, draw, &drawn));
     ORB_TRY(compose(job, moving, second, PINS, 0, draw, &pinned));
   }
@@ -352,8 +341,9 @@ static orb_status bring_together(rim_job *job, const orb_rim_side *first) {
   if (job->is_large && job->energy < INFINITY) {
     ORB_TRY(lift(job, pinned ? PINS : SPRINGS, stiffness));
   }
-  int met = job->energy <= WORST &&
-            job->energy - 1 <= PAID_TIMES * (job->given_energy - 1) + (pinned ? PAID_MORE : PAID_LESS);
+  const double more = pinned ? params->rims.paid_more : params->rims.paid_less;
+  int met =
+      job->energy <= params->rims.worst && job->energy - 1 <= params->rims.paid_times * (job->given_energy - 1) + more;
   if (met && !pinned) {
     ORB_TRY(have_met(job, first, &met));
   }
@@ -386,12 +376,14 @@ static void take(orb_context *ctx, orb_aligned_shape *fresh, orb_aligned_shape *
 
 /* Composes the map to a shape with these points held. *met 0: there is no such map, for example because the spheres
  * have no room for the points, and nothing has changed. */
-static orb_status hold(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, const orb_rim_side *first,
-                       const orb_rim_points *points, double *energy, int *met) {
-  const orb_map_params params = orb_map_params_of(preset);
+static orb_status hold(orb_context *ctx, const orb_align_options *options, const orb_map_params *params,
+                       orb_alignment *a, int32_t s, const orb_rim_side *first, const orb_rim_points *points,
+                       double *energy, int *met) {
   rim_job job = {.ctx = ctx,
-                 .preset = preset,
-                 .is_large = a->shapes[s].mesh.vertex_count > params.copies.large,
+                 .preset = options->preset,
+                 .params = params,
+                 .holds_landmarks = options->method != ORB_ALIGN_ROTATE,
+                 .is_large = a->shapes[s].mesh.vertex_count > params->copies.large,
                  .energy = INFINITY};
   orb_status status = run(&job, a, s, first, points);
   *met = status == ORB_OK && job.energy < INFINITY;
@@ -444,25 +436,28 @@ done:
 }
 
 /* Matches the holes of shape s with those of the first shape. *energy changes with the map. */
-static orb_status match_shape(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double *energy) {
+static orb_status match_shape(orb_context *ctx, const orb_align_options *options, orb_alignment *a, int32_t s,
+                              double *energy) {
   orb_rim_side sides[2];
   orb_rim_pair *pairs = NULL;
   orb_rim_points points = {0};
-  const int is_large = a->shapes[s].mesh.vertex_count > orb_map_params_of(preset).copies.large;
+  const orb_map_params params = orb_map_params_of(options->preset);
+  const int is_large = a->shapes[s].mesh.vertex_count > params.copies.large;
   int32_t count = 0;
   int met = 0;
   orb_status status;
   ORB_GO(status, orb_rim_sides_create(ctx, &a->shapes[0], &a->shapes[s], sides), done);
-  ORB_GO(status, orb_rims_pair(ctx, sides, &pairs, &count), done);
+  ORB_GO(status, orb_rims_pair(ctx, &params, sides, &pairs, &count), done);
   for (int32_t i = 0; i < count; i++) {
     const int32_t share = (is_large ? MOST_POINTS_OF_LARGE : MOST_POINTS) / count;
     ORB_GO(status,
-           orb_rims_along(ctx, sides, &pairs[i], share > LEAST_POINTS_A_RIM ? share : LEAST_POINTS_A_RIM, &points),
+           orb_rims_along(ctx, &params, sides, &pairs[i], share > LEAST_POINTS_A_RIM ? share : LEAST_POINTS_A_RIM,
+                          &points),
            done);
   }
   if (count > 0) {
     ORB_GO(status, note(ctx, sides, pairs, count, s, a), done);
-    ORB_GO(status, hold(ctx, a, s, preset, &sides[0], &points, energy, &met), done);
+    ORB_GO(status, hold(ctx, options, &params, a, s, &sides[0], &points, energy, &met), done);
     a->rim_count -= met ? 0 : count;
     status = met ? measure(ctx, a, s, count) : ORB_OK;
   }
@@ -485,7 +480,7 @@ orb_status orb_align_rims(orb_context *ctx, const orb_align_options *options, or
   for (int32_t s = 1; s < out->shape_count; s++) {
     double energy = NAN;
     if (orb_has_holes(&out->shapes[s].mesh)) {
-      ORB_TRY(match_shape(ctx, out, s, options->preset, &energy));
+      ORB_TRY(match_shape(ctx, options, out, s, &energy));
     }
     if (isnan(energy)) {
       ORB_TRY(orb_compose_energy(ctx, &out->shapes[0], &out->shapes[s], options->preset, &energy));
