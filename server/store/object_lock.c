@@ -51,7 +51,8 @@ static int run(object_lock *l, const char *sql) {
 
 /* All locks of the connection are this one and its number. It may be a new connection, which has none. */
 static void let_all_go(object_lock *l) {
-  run(l, "SELECT pg_advisory_unlock_all()");
+  database_settle(&l->db);
+  database_run(&l->db, database_statement(&l->db, "SELECT pg_advisory_unlock_all()"));
 }
 
 /* A connection that was made again has no locks. */
@@ -84,17 +85,32 @@ static int wait_for_deletions(object_lock *l) {
   return 1;
 }
 
+/* Sends the two locks; the wait for deletions sends its first question with them. */
+static int lock_shared(object_lock *l) {
+  sql_statement *st = database_statement(&l->db, "SELECT pg_advisory_lock_shared(?1::int, hashtext(current_schema()))");
+  int code = SQL_ERROR;
+  if (st) {
+    sql_bind_integer(st, 1, SQL_LOCK_OBJECTS);
+    code = database_run_later(&l->db, st, SQL_ANY);
+  }
+  st = code == SQL_OK ? database_statement(&l->db, "SELECT pg_advisory_lock(?1)") : NULL;
+  if (st) {
+    sql_bind_integer(st, 1, l->number);
+    code = database_run_later(&l->db, st, SQL_ANY);
+  }
+  return code == SQL_OK && st;
+}
+
 /* Each time that sharing begins, it gets a new number, also if it does not get the lock: then nobody holds the number.
  */
 static int begin_sharing(object_lock *l) {
-  char sql[192];
   uint64_t random;
   randombytes_buf(&random, sizeof random);
   l->number = (int64_t)(random >> 1) | 1;
-  snprintf(sql, sizeof sql,
-           "SELECT pg_advisory_lock_shared(%d, hashtext(current_schema())); SELECT pg_advisory_lock(%lld)",
-           SQL_LOCK_OBJECTS, (long long)l->number);
-  int taken = run(l, sql) && wait_for_deletions(l);
+  int taken = lock_shared(l) && wait_for_deletions(l);
+  if (!taken) { /* a connection that was lost is made again */
+    taken = lock_shared(l) && wait_for_deletions(l);
+  }
   if (!taken) {
     let_all_go(l);
   }
@@ -126,18 +142,11 @@ int64_t object_lock_number(void) {
 
 /* The number can be taken here only if the connection that held it is gone. */
 int object_lock_check(database *db, int64_t number) {
-  if (!number) {
-    return SQL_OK;
+  sql_statement *st = number ? database_statement(db, "SELECT pg_try_advisory_xact_lock(?1)::int") : NULL;
+  if (st) {
+    sql_bind_integer(st, 1, number);
   }
-  sql_statement *st = database_statement(db, "SELECT pg_try_advisory_xact_lock(?1)::int");
-  if (!st) {
-    return SQL_ERROR;
-  }
-  sql_bind_integer(st, 1, number);
-  int code = sql_step(st);
-  code = code == SQL_ROW ? (sql_integer(st, 0) ? SQL_LOST : SQL_OK) : code == SQL_DONE ? SQL_ERROR : code;
-  sql_reset(st);
-  return code;
+  return number ? database_run_later(db, st, SQL_ZERO) : SQL_OK;
 }
 
 /* The second lock is that of transactions (catalogue.c): a transaction that checked its lock before this one was free

@@ -19,7 +19,7 @@ static int owner_insert(database *db, const resource *r, const char *tenant, con
   sql_bind_integer(st, 5, resource_is_derived(r->kind) ? 0 : r->bytes);
   sql_bind_integer(st, 6, r->created);
   sql_bind_integer(st, 7, resource_is_derived(r->kind) ? r->bytes : 0);
-  return database_run(db, st);
+  return database_run_later(db, st, SQL_ANY);
 }
 
 /* Whether a query returns a row, with kind, id and text (unless NULL) bound. */
@@ -41,7 +41,7 @@ static int exists(database *db, const char *sql, int kind, const char *id, const
 }
 
 /* If the result existed before, this owner's description has the time of the owner's job. */
-int owner_of_job(database *db, const char *job, int64_t now) {
+int owner_of_job(database *db, const char *job, int64_t now, int made) {
   sql_statement *st = database_statement(
       db,
       "INSERT INTO owner(kind, id, tenant, json, bytes, created, derived)"
@@ -50,12 +50,14 @@ int owner_of_job(database *db, const char *job, int64_t now) {
       "   json_set(r.json, '$.created', strftime('%Y-%m-%dT%H:%M:%S', ?2/1000, 'unixepoch') ||"
       "    printf('.%03dZ', ?2%1000))), 0, ?2, r.bytes"
       " FROM job j JOIN resource r ON r.kind=j.kind+1 AND r.id=j.key WHERE j.id=?1 ON CONFLICT DO NOTHING");
-  int code = SQL_ERROR;
   if (st) {
     sql_bind_text(st, 1, job);
     sql_bind_integer(st, 2, now);
-    code = database_run(db, st);
   }
+  if (made) {
+    return database_run_later(db, st, SQL_ANY);
+  }
+  int code = database_run(db, st);
   if (code != SQL_OK || sql_changes(db) > 0) {
     return code;
   }
@@ -146,8 +148,8 @@ static int put(database *db, void *arg) {
   if (p->quota > 0 && bytes + p->row->bytes > p->quota) {
     return SQL_CONSTRAINT;
   }
-  code = resource_insert(db, p->row);
-  int first = sql_changes(db) > 0;
+  int first = 0;
+  code = resource_insert(db, p->row, &first);
   if (code == SQL_OK) {
     code = owner_insert(db, p->row, p->tenant, first ? NULL : p->row->json);
   }
@@ -169,8 +171,12 @@ typedef struct alignment_arg {
 
 static int put_alignment(database *db, void *arg) {
   const alignment_arg *a = arg;
-  int code = resource_remove(db, RESOURCE_ALIGNMENT, a->row->id);
-  code = code == SQL_OK || code == SQL_NOTFOUND ? resource_insert(db, a->row) : code;
+  sql_statement *st = database_statement(db, "DELETE FROM resource WHERE kind=4 AND id=?1");
+  if (st) {
+    sql_bind_text(st, 1, a->row->id);
+  }
+  int code = database_run_later(db, st, SQL_ANY);
+  code = code == SQL_OK ? resource_insert(db, a->row, NULL) : code;
   return code == SQL_OK ? owner_insert(db, a->row, a->tenant, NULL) : code;
 }
 

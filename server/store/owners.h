@@ -17,7 +17,7 @@
 
 /* Functions with a database argument run inside a transaction of the writer. */
 /* Makes the owner of a job that succeeded an owner of its result. SQL_CONSTRAINT if the result does not exist. */
-int owner_of_job(database *db, const char *job, int64_t now);
+int owner_of_job(database *db, const char *job, int64_t now, int made);
 /* Makes the tenant that requests a job an owner of the meshes that it names, so that another owner's DELETE does not
  * remove them. SQL_NOTFOUND if `all` is set and a mesh does not exist. */
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all);

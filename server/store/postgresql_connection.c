@@ -213,7 +213,7 @@ int pgsql_restore(pgsql_connection *c) {
 
 int pgsql_is_within(const pgsql_connection *c) {
   PGTransactionStatusType status = PQtransactionStatus(c->server);
-  return status == PQTRANS_INTRANS || status == PQTRANS_INERROR;
+  return c->begun || status == PQTRANS_INTRANS || status == PQTRANS_INERROR;
 }
 
 int pgsql_open(const char *where, int writer, pgsql_connection **out) {
