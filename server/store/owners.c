@@ -202,6 +202,60 @@ store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id
   return rows_one(cat, db, st, &resource_rows, out);
 }
 
+static int read_id(sql_statement *st, void *out) {
+  row_text(st, 0, out, API_ID_SIZE);
+  return 1;
+}
+
+/* In PostgreSQL with one question. */
+static store_result owns_at_once(catalogue *cat, resource_kind kind, char (*ids)[API_ID_SIZE], int count,
+                                 const char *tenant, int *owns) {
+  static const row_kind id_rows = {.read = read_id, .size = API_ID_SIZE};
+  api_text list = {0};
+  for (int i = 0; i < count; i++) {
+    api_text_printf(&list, "%s%s", i ? "," : "", ids[i]);
+  }
+  char(*found)[API_ID_SIZE] = list.failed ? NULL : calloc((size_t)count, sizeof *found);
+  int n = -1;
+  if (found) {
+    database *db = catalogue_reader(cat);
+    sql_statement *st =
+        database_statement(db, "SELECT id FROM owner WHERE kind=?3 AND tenant=?2 AND id=ANY(string_to_array(?1, ','))");
+    if (st) {
+      sql_bind_text(st, 1, list.data);
+      sql_bind_text(st, 2, tenant);
+      sql_bind_integer(st, 3, (int)kind);
+    }
+    n = rows_many(cat, db, st, &id_rows, found, count);
+  }
+  for (int i = 0; i < count; i++) {
+    for (int k = 0; k < n; k++) {
+      owns[i] |= strcmp(found[k], ids[i]) == 0;
+    }
+  }
+  api_text_free(&list);
+  free(found);
+  return n >= 0 ? STORE_OK : STORE_ERROR;
+}
+
+store_result catalogue_owns(catalogue *cat, resource_kind kind, char (*ids)[API_ID_SIZE], int count, const char *tenant,
+                            int *owns) {
+  memset(owns, 0, (size_t)count * sizeof *owns);
+  if (count > 0 && database_is_url(catalogue_path(cat))) {
+    return owns_at_once(cat, kind, ids, count, tenant, owns);
+  }
+  for (int i = 0; i < count; i++) {
+    resource known = {0};
+    store_result found = catalogue_get_of(cat, kind, ids[i], tenant, &known);
+    resource_free(&known);
+    owns[i] = found == STORE_OK;
+    if (found == STORE_ERROR) {
+      return found;
+    }
+  }
+  return STORE_OK;
+}
+
 int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit,
                       resource *out) {
   database *db = catalogue_reader(cat);
@@ -244,11 +298,6 @@ store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id
   store_result result = catalogue_write(cat, disown, &arg);
   *gone = result == STORE_OK && arg.gone;
   return result;
-}
-
-static int read_id(sql_statement *st, void *out) {
-  row_text(st, 0, out, API_ID_SIZE);
-  return 1;
 }
 
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant) {
