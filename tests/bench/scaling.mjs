@@ -9,8 +9,11 @@
 // what the nodes really had, and says whether they waited for the database and S3 instead. ORB_KIND is what is asked ORB_JOBS (200)
 // times for each number of nodes, ORB_NODES (1,2,4): "embedding" (the default) of 20,480 triangles, "morph" of two embedded
 // shapes of 1,280 each, or "rotate", the same with align.method rotate. Each ORB_LEVEL less than 5 (3 for morphs) has a quarter of these
-// triangles. ORBMORPHD names the daemon. Beside other work, `chrt -f 1` before the command gives the stores their time first; the
-// nodes that are measured drop that priority.
+// triangles. Each node has ORB_WORKERS (1) workers. ORBMORPHD names the daemon, TMPDIR where the nodes have their folders. Beside other
+// work, `chrt -f 1` before the command gives the stores their time first; the nodes that are measured drop that priority.
+//
+// "ms a job" is processor time, whose sum bounds what the cores can do; "rest" is the node that serves and this program. "others" is
+// what programs had that have nothing to do with it. With ORB_STATEMENTS=1 the statements that ran most follow.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, writeFileSync } from 'node:fs';
@@ -192,7 +195,7 @@ async function measure(count) {
     const spent = () => {
       const had = roots.map(cpu);
       const sum = had.reduce((one, other) => one + other, 0);
-      return { had, seconds: [sum, cpu(server), s3(), cpu(process.pid) - sum, busy()] };
+      return { had, seconds: [sum, cpu(server), s3(), cpu(process.pid) - sum, busy()], at: Date.now() };
     };
     // The database knows when the last job ended: asking it more often would take time from the nodes.
     const ended = () =>
@@ -202,17 +205,17 @@ async function measure(count) {
       ).split('|');
     const before = cost(catalogue);
     const asked = requests();
-    const start_ = spent();
+    const started = spent();
     const began = Date.now();
     const first = Number(ended()[0]);
     while (Number(ended()[0]) < jobs) await new Promise((done) => setTimeout(done, 1000));
-    const wall = (Date.now() - began) / 1000;
     const end = spent();
+    const wall = (end.at - started.at) / 1000;
     const done = jobs - first;
-    const used = end.seconds.map((value, i) => value - start_.seconds[i]);
+    const used = end.seconds.map((value, i) => value - started.seconds[i]);
     return {
       rate: (1000 * done) / (Number(ended()[1]) - began),
-      got: end.had.map((value, i) => (value - start_.had[i]) / wall),
+      got: end.had.map((value, i) => (value - started.had[i]) / wall),
       each: [...cost(catalogue).map((value, i) => (value - before[i]) / done), (requests() - asked) / done],
       ms: used.slice(0, 4).map((seconds) => (1000 * seconds) / done),
       others: (used[4] - used[0] - used[1] - used[2] - used[3]) / wall,
