@@ -68,13 +68,28 @@ static int judge(pgsql_connection *c, PGresult *result, sql_expect expect) {
   return expect == SQL_ONE_CHANGE && c->changes != 1 ? SQL_CONSTRAINT : expect == SQL_ZERO && !zero ? SQL_LOST : SQL_OK;
 }
 
-/* The result of one statement, whose end is marked by NULL. NULL: the connection is lost. */
-static PGresult *take(pgsql_connection *c) {
+/* The result of one statement, whose end is marked by NULL: a server that ends may send several errors. NULL: the
+ * connection is lost. */
+static PGresult *take(const pgsql_connection *c) {
   PGresult *result = PQgetResult(c->server);
-  if (result && !pgsql_is_lost(c)) {
-    PQclear(PQgetResult(c->server));
+  for (PGresult *more = result; more && !pgsql_is_lost(c);) {
+    more = PQgetResult(c->server);
+    PQclear(more);
   }
   return result;
+}
+
+/* Takes what is left until the server has come to the end of the pipeline. If it does not, the connection is of no use.
+ */
+static void leave(pgsql_connection *c) {
+  enum { MOST = 2 * PGSQL_SENT };
+  int over = 0;
+  for (int i = 0; i < MOST && !over && !pgsql_is_lost(c); i++) {
+    PGresult *result = PQgetResult(c->server);
+    over = result && PQresultStatus(result) == PGRES_PIPELINE_SYNC;
+    PQclear(result);
+  }
+  c->broken |= !over || !PQexitPipelineMode(c->server);
 }
 
 int pgsql_settle(pgsql_connection *c, PGresult **last) {
@@ -98,9 +113,6 @@ int pgsql_settle(pgsql_connection *c, PGresult **last) {
     }
   }
   c->sent = c->begun = 0;
-  if (!pgsql_is_lost(c)) {
-    PQclear(PQgetResult(c->server)); /* the end of the pipeline */
-    PQexitPipelineMode(c->server);
-  }
+  leave(c);
   return code;
 }
