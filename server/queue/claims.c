@@ -188,7 +188,9 @@ static job *refuse(queue *q, job_claim *c) {
 static job *claim(queue *q, queue_lane lane, const claim_wish *wish, int *threads) {
   sharing *s = q->shared;
   job_claim claimed;
+  const int guests = s->look[QUEUE_GUESTS];
   s->look[lane] = 0;
+  s->look[QUEUE_GUESTS] = 0; /* what comes meanwhile sets it again */
   s->looking[lane] = 1;
   pthread_mutex_unlock(&q->lock);
   FAULT_POINT("before-claim");
@@ -196,6 +198,10 @@ static job *claim(queue *q, queue_lane lane, const claim_wish *wish, int *thread
   FAULT_POINT("after-claim");
   pthread_mutex_lock(&q->lock);
   s->looking[lane] = 0;
+  /* A guest is a job of an owner who has no running one, so not of the owner of this one. */
+  if (lane != QUEUE_GUESTS && (result != STORE_OK || claimed.others > 0)) {
+    s->look[QUEUE_GUESTS] |= guests;
+  }
   if (result != STORE_OK) {
     return NULL;
   }

@@ -49,6 +49,7 @@ static store_result end_job(queue *q, job *j, job_end *end, int worked) {
   pthread_mutex_lock(&q->lock);
   job shown = *j;
   end->owner = j->row.owner;
+  end->started = j->row.started;
   end->worker_ms = worked && !fetches(j) ? used_ms(j, orb_clock_ms()) : 0;
   shown.row.state = state;
   shown.row.finished = end->now;

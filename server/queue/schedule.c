@@ -204,17 +204,14 @@ void schedule_leave(queue *q, job *j) {
 store_result queue_claim(queue *q, job *j) {
   int64_t now = unix_ms();
   if (q->shared) { /* queue_take() has claimed it */
-    store_result begun = STORE_OK;
     if (!j->row.started) {
-      begun = catalogue_job_begin(q->cat, j->row.id, j->row.attempt);
+      catalogue_job_begin(q->cat, j->row.id, j->row.attempt);
     }
     pthread_mutex_lock(&q->lock);
-    if (begun == STORE_OK) {
-      j->row.state = API_JOB_RUNNING;
-      j->row.started = j->row.started ? j->row.started : now;
-    }
+    j->row.state = API_JOB_RUNNING;
+    j->row.started = j->row.started ? j->row.started : now;
     pthread_mutex_unlock(&q->lock);
-    return begun;
+    return STORE_OK;
   }
   FAULT_POINT("before-claim");
   store_result result = catalogue_job_claim(q->cat, j->row.id, j->row.attempt + 1, j->row.suspect, now);

@@ -15,7 +15,7 @@
 #include "store/transactions.h"
 #include "wake.h"
 
-enum { BUSY_TRIES = 3 }; /* for a batch that waited too long for another node or conflicted with it */
+enum { BUSY_TRIES = 3 };
 
 /* How long events and times of use wait for a write whose caller waits. Their own commit, with its fdatasync(), costs
  * more than all else that a small job writes. The end of such a job takes its events along. */
@@ -29,7 +29,8 @@ typedef struct pending {
   struct pending *next;
   write_fn fn;
   void *arg;
-  int later;      /* nobody waits for it: the writer frees it */
+  int later; /* nobody waits for it: the writer frees it, and its argument by `release` */
+  void (*release)(void *arg);
   int64_t number; /* see object_lock_check() */
   int done, code;
 } pending;
@@ -37,10 +38,11 @@ typedef struct pending {
 struct catalogue {
   pthread_mutex_t lock;
   pthread_cond_t wake, committed, reader_free;
-  pending *first, **last;
+  pending *first, **last, *newest;
   int urgent; /* of the waiting writes, all but those of catalogue_write_gathered() */
   int stopping, started;
-  int shared; /* other nodes use it as well */
+  int shared;  /* other nodes use it as well */
+  int commits; /* of the writer: the running batch has sent its commit */
   pthread_t thread;
   database writer;
   database readers[DATABASE_READERS];
@@ -65,13 +67,6 @@ static store_result result_of(int code) {
   }
 }
 
-/* Nodes write one after another, as the writers of one process do through its writer thread. */
-static int begin(const catalogue *cat, database *db) {
-  char sql[96];
-  snprintf(sql, sizeof sql, "BEGIN; SELECT pg_advisory_xact_lock(%d, hashtext(current_schema()))", SQL_LOCK_WRITES);
-  return database_execute(db, cat->shared ? sql : database_either(db, "BEGIN IMMEDIATE", "BEGIN"));
-}
-
 /* One write of a batch. */
 static int run_one(database *db, pending *p) {
   p->code = object_lock_check(db, p->number);
@@ -79,36 +74,46 @@ static int run_one(database *db, pending *p) {
   return p->code;
 }
 
+static int commit(catalogue *cat) {
+  FAULT_POINT("before-commit");
+  cat->commits = 1;
+  return database_execute(&cat->writer, "COMMIT");
+}
+
 /* Runs a batch in one transaction without savepoints: a single write, or writes to a database on another machine, where
  * savepoints would cost as many requests as a small write itself while other nodes wait. If one of several writes
  * fails, nothing is written, and *again is 1. */
 static int run_plain(catalogue *cat, pending *batch, int *again) {
   database *db = &cat->writer;
-  int code = begin(cat, db);
-  for (pending *p = batch; p && code == SQL_OK; p = p->next) {
-    if (run_one(db, p) == SQL_OK) {
-      continue;
-    }
-    code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : p->code;
-    *again = code == SQL_OK && batch->next != NULL;
-    if (code == SQL_OK) {
-      return SQL_OK;
-    }
+  int code = database_begin(db), failed = SQL_OK;
+  for (pending *p = batch; p && code == SQL_OK && failed == SQL_OK; p = p->next) {
+    failed = run_one(db, p);
   }
-  FAULT_POINT("before-commit");
-  return code == SQL_OK ? database_execute(db, "COMMIT") : code;
+  failed = code == SQL_OK && failed == SQL_OK ? database_settle(db) : failed;
+  if (failed != SQL_OK) {
+    batch->code = failed; /* if there are others, they run again */
+    database_settle(db);
+    code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : failed;
+    *again = code == SQL_OK && batch->next != NULL;
+    return code;
+  }
+  return code == SQL_OK ? commit(cat) : code;
 }
 
 /* The same with savepoints: a write that fails is rolled back alone. */
 static int run_careful(catalogue *cat, pending *batch) {
   database *db = &cat->writer;
-  int code = begin(cat, db);
+  int code = database_begin(db);
   for (pending *p = batch; p && code == SQL_OK; p = p->next) {
     if (database_execute(db, "SAVEPOINT one") != SQL_OK) {
       code = SQL_IOERR;
       break;
     }
-    if (run_one(db, p) != SQL_OK) {
+    if (run_one(db, p) == SQL_OK) {
+      p->code = database_settle(db);
+    }
+    if (p->code != SQL_OK) {
+      database_settle(db);
       database_execute(db, "ROLLBACK TO one");
     }
     /* A full disk or an input/output error may have rolled back everything already. */
@@ -118,8 +123,7 @@ static int run_careful(catalogue *cat, pending *batch) {
       code = SQL_IOERR;
     }
   }
-  FAULT_POINT("before-commit");
-  return code == SQL_OK ? database_execute(db, "COMMIT") : code;
+  return code == SQL_OK ? commit(cat) : code;
 }
 
 /* Runs a batch. A write that fails changes nothing, and the others are written; if the commit fails, all writes fail.
@@ -127,6 +131,7 @@ static int run_careful(catalogue *cat, pending *batch) {
 static int run_batch(catalogue *cat, pending *batch) {
   database *db = &cat->writer;
   FAULT_POINT("before-begin");
+  cat->commits = 0;
   /* A previous transaction may still be open if its rollback failed. */
   int code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : SQL_OK;
   int careful = !cat->shared && batch->next;
@@ -161,6 +166,13 @@ static pending *wait_for_batch(catalogue *cat) {
   return cat->first;
 }
 
+/* Whether a batch that wrote nothing runs again: one that waited too long for another node or conflicted with it, or
+ * one whose connection was lost, which shows only when it is used. */
+static int may_repeat(const catalogue *cat, int code, int tries) {
+  return (cat->shared && code == SQL_BUSY && tries < BUSY_TRIES) ||
+         (database_is_url(cat->path) && code == SQL_IOERR && !cat->commits && tries == 1);
+}
+
 static void *writer_main(void *argument) {
   catalogue *cat = argument;
   pthread_mutex_lock(&cat->lock);
@@ -168,16 +180,20 @@ static void *writer_main(void *argument) {
     cat->urgent = 0;
     cat->first = NULL;
     cat->last = &cat->first;
+    cat->newest = NULL;
     pthread_mutex_unlock(&cat->lock);
     int code = run_batch(cat, batch);
-    for (int tries = 1; cat->shared && code == SQL_BUSY && tries < BUSY_TRIES; tries++) {
+    for (int tries = 1; may_repeat(cat, code, tries); tries++) {
       code = run_batch(cat, batch);
+    }
+    if (code != SQL_OK && database_is_url(cat->path) && !sql_postgresql_is_away()) {
+      log_error("catalogue: a transaction failed: %s", cat->writer.connection.driver->message(&cat->writer.connection));
     }
     pthread_mutex_lock(&cat->lock);
     for (pending *p = batch, *next; p; p = next) {
       next = p->next;
       if (p->later) {
-        free(p->arg);
+        p->release(p->arg);
         free(p);
       } else {
         p->done = 1; /* its thread may now return, which ends the life of p */
@@ -195,6 +211,7 @@ static void enqueue(catalogue *cat, pending *p, int urgent) {
   }
   *cat->last = p;
   cat->last = &p->next;
+  cat->newest = p;
   cat->urgent |= urgent;
 }
 
@@ -223,7 +240,7 @@ static void write_later(catalogue *cat, write_fn fn, void *arg, int urgent) {
     free(arg);
     return;
   }
-  *p = (pending){.fn = fn, .arg = arg, .later = 1};
+  *p = (pending){.fn = fn, .arg = arg, .later = 1, .release = free};
   pthread_mutex_lock(&cat->lock);
   enqueue(cat, p, urgent);
   pthread_mutex_unlock(&cat->lock);
@@ -235,6 +252,22 @@ void catalogue_write_later(catalogue *cat, write_fn fn, void *arg) {
 
 void catalogue_write_gathered(catalogue *cat, write_fn fn, void *arg) {
   write_later(cat, fn, arg, 0);
+}
+
+void catalogue_write_joined(catalogue *cat, write_fn fn, void *arg, int (*join)(void *waiting, void *arg),
+                            void (*release)(void *arg)) {
+  pthread_mutex_lock(&cat->lock);
+  pending *newest = cat->newest && cat->newest->fn == fn ? cat->newest : NULL;
+  const int joined = newest && join(newest->arg, arg);
+  pending *p = joined ? NULL : calloc(1, sizeof *p);
+  if (p) {
+    *p = (pending){.fn = fn, .arg = arg, .later = 1, .release = release};
+    enqueue(cat, p, 0);
+  }
+  pthread_mutex_unlock(&cat->lock);
+  if (!joined && !p) {
+    release(arg);
+  }
 }
 
 database *catalogue_reader(catalogue *cat) {

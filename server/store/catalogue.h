@@ -104,6 +104,12 @@ enum { RESOURCE_OBJECTS = 3 + PROFILES_STORED };
 int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]);
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
+typedef struct resource_key {
+  resource_kind kind;
+  char id[API_ID_SIZE];
+} resource_key;
+/* The same for several, each named once; json NULL: there is no such row. STORE_ERROR: none is read. */
+store_result catalogue_get_all(catalogue *cat, const resource_key *keys, int count, resource *out);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* Functions that list return the number of rows filled, or −1, and fill nothing, if the rows cannot be read. */
 /* Lists the newest rows first, and only those before sequence number `before` (0: all). Landmarks come without their
@@ -175,6 +181,7 @@ typedef struct job_end {
   const char *mesh;       /* of a mesh from a URL: its id; NULL: none */
   int64_t now, event;     /* event: the number of the last event */
   const char *event_json; /* of the last event: the job */
+  int64_t started;        /* of a job whose start is not in its row yet */
   const char *owner;      /* the tenant that worker_ms counts for */
   int64_t worker_ms;      /* how long a worker had it */
 } job_end;

@@ -217,6 +217,30 @@ int database_run(database *db, sql_statement *statement) {
   return code;
 }
 
+/* Logs an error that no caller expects. A lost connection is the business of those who repeat the transaction. */
+static int complain(const database *db, int code) {
+  const int lost = code == SQL_IOERR && db->connection.driver == &sql_postgresql;
+  if (code != SQL_OK && code != SQL_CONSTRAINT && code != SQL_LOST && !lost) {
+    log_error("catalogue: %s", db->connection.driver->message(&db->connection));
+  }
+  return code;
+}
+
+int database_run_later(database *db, sql_statement *statement, sql_expect expect) {
+  if (!statement) {
+    return SQL_ERROR;
+  }
+  return complain(db, sql_later(statement, expect));
+}
+
+int database_settle(database *db) {
+  return complain(db, db->connection.driver->settle(&db->connection));
+}
+
+int database_begin(database *db) {
+  return db->connection.driver->begin(&db->connection);
+}
+
 /* One step of the schema in one transaction. */
 static int migrate_to(database *db, int version, const char *step) {
   char mark[64];

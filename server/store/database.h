@@ -22,7 +22,11 @@ void database_close(database *db);
 sql_statement *database_statement(database *db, const char *sql);
 /* Steps once, for statements without result rows. SQL_OK or the error. */
 int database_run(database *db, sql_statement *statement);
+/* The same for a statement whose result nobody waits for (sql_driver.later). */
+int database_run_later(database *db, sql_statement *statement, sql_expect expect);
+int database_settle(database *db); /* waits for them */
 int database_execute(database *db, const char *sql);
+int database_begin(database *db); /* a transaction that writes */
 /* Whether it is in PostgreSQL. */
 int database_is_url(const char *where);
 /* The SQL for this database, where the two do not speak the same. */

@@ -66,28 +66,39 @@ int delivery_subscribe(database *db, const char *job, const job_webhook *hook) {
 }
 
 /* Numbers continue after those of the job's other deliveries; {n} of a path has two digits. */
-static const char add_deliveries[] =
-    "INSERT INTO delivery(job, number, webhook, receiver, url, type, body, next, created)"
-    " SELECT ?1, (SELECT coalesce(max(number), 0) FROM delivery WHERE job=?1) + row_number() OVER (ORDER BY own, name),"
-    "  name, receiver, url, ?3, ?4, ?2, ?2 FROM"
-    " (SELECT 0 AS own, '@'||j.owner AS name, j.owner||' '||h.origin AS receiver, h.url AS url"
-    "   FROM job j JOIN job_webhook h ON h.job=j.id WHERE j.id=?1 AND (h.events & ?5) <> 0"
-    "  UNION ALL SELECT 1, w.name, j.owner||' '||w.origin, w.url"
-    "   FROM job j JOIN webhook w ON w.tenant=j.owner"
-    "   WHERE j.id=?1 AND j.listed=1 AND w.url<>'' AND (w.events & ?5) <> 0 AND ?6<>0) AS due"
-    " LIMIT ?7";
+#define ADD_DELIVERIES                                                                                                 \
+  "INSERT INTO delivery(job, number, webhook, receiver, url, type, body, next, created)"                               \
+  " SELECT ?1, (SELECT coalesce(max(number), 0) FROM delivery WHERE job=?1) + row_number() OVER (ORDER BY own, name)," \
+  "  name, receiver, url, ?3, ?4, ?2, ?2 FROM"                                                                         \
+  " (SELECT 0 AS own, '@'||j.owner AS name, j.owner||' '||h.origin AS receiver, h.url AS url"                          \
+  "   FROM job j JOIN job_webhook h ON h.job=j.id WHERE j.id=?1 AND (h.events & ?5) <> 0"                              \
+  "  UNION ALL SELECT 1, w.name, j.owner||' '||w.origin, w.url"                                                        \
+  "   FROM job j JOIN webhook w ON w.tenant=j.owner"                                                                   \
+  "   WHERE j.id=?1 AND j.listed=1 AND w.url<>'' AND (w.events & ?5) <> 0 AND ?6<>0) AS due"                           \
+  " LIMIT ?7"
+#define ADD_RECEIVERS(of)                                                                 \
+  "INSERT INTO receiver(name, tenant, next) SELECT d.receiver, j.owner, min(d.next)"      \
+  " FROM " of                                                                             \
+  " d JOIN job j ON j.id=d.job WHERE d.job=?1 AND d.state=0 GROUP BY d.receiver, j.owner" \
+  " ON CONFLICT(name) DO UPDATE SET next=iif(excluded.next<receiver.next, excluded.next, receiver.next)"
+#define DROP_SUBSCRIPTIONS "DELETE FROM job_webhook WHERE job=?1"
+static const char add_deliveries[] = ADD_DELIVERIES, add_receivers[] = ADD_RECEIVERS("delivery"),
+                  drop_subscriptions[] = DROP_SUBSCRIPTIONS;
 
-static const char add_receivers[] =
-    "INSERT INTO receiver(name, tenant, next) SELECT d.receiver, j.owner, min(d.next)"
-    " FROM delivery d JOIN job j ON j.id=d.job WHERE d.job=?1 AND d.state=0 GROUP BY d.receiver, j.owner"
-    " ON CONFLICT(name) DO UPDATE SET next=iif(excluded.next<receiver.next, excluded.next, receiver.next)";
+/* All three in one statement, for PostgreSQL. Its parts see the rows as they were before. */
+static const char add_all[] = "WITH d AS (" ADD_DELIVERIES " RETURNING *), dropped AS (" DROP_SUBSCRIPTIONS
+                              " AND ?6<>0) " ADD_RECEIVERS("(SELECT * FROM d)");
+
+static int is_one_statement(const database *db) {
+  return db->connection.driver == &sql_postgresql;
+}
 
 static int announce_to(database *db, const char *job, api_job_state state, const char *json, int64_t now, int all) {
   api_text body = {0};
   char type[24];
   api_webhook_body_write(state, now, json, &body);
   snprintf(type, sizeof type, "job.%s", api_job_state_name(state));
-  sql_statement *st = body.failed ? NULL : database_statement(db, add_deliveries);
+  sql_statement *st = body.failed ? NULL : database_statement(db, database_either(db, add_deliveries, add_all));
   int code = body.failed ? SQL_NOMEM : SQL_ERROR;
   if (st) {
     sql_bind_text(st, 1, job);
@@ -97,20 +108,18 @@ static int announce_to(database *db, const char *job, api_job_state state, const
     sql_bind_integer(st, 5, API_EVENT(state));
     sql_bind_integer(st, 6, all);
     sql_bind_integer(st, 7, DELIVERIES_OF_JOB);
-    code = database_run(db, st);
+    code = is_one_statement(db) ? database_run_later(db, st, SQL_ANY) : database_run(db, st);
   }
   api_text_free(&body);
-  if (code != SQL_OK || sql_changes(db) == 0) {
+  if (code != SQL_OK || is_one_statement(db) || sql_changes(db) == 0) {
     return code;
   }
   return run_for(db, add_receivers, job, now);
 }
 
-static const char drop_subscriptions[] = "DELETE FROM job_webhook WHERE job=?1";
-
 int delivery_announce(database *db, const char *job, api_job_state state, const char *json, int64_t now) {
   int code = announce_to(db, job, state, json, now, 1);
-  return code == SQL_OK ? run_for(db, drop_subscriptions, job, now) : code;
+  return code == SQL_OK && !is_one_statement(db) ? run_for(db, drop_subscriptions, job, now) : code;
 }
 
 typedef struct subscribe_arg {

@@ -148,7 +148,8 @@ static int finish(database *db, void *arg) {
   const job_end *end = c->end;
   sql_statement *st = database_statement(db,
                                          "UPDATE job SET state=?3, problem=?4, finished=?5, suspect=0, alone=0,"
-                                         " result=?6 WHERE id=?1 AND attempt=?2 AND state<2");
+                                         " result=?6, started=CASE started WHEN 0 THEN ?7 ELSE started END"
+                                         " WHERE id=?1 AND attempt=?2 AND state<2");
   if (st) {
     sql_bind_text(st, 1, c->id);
     sql_bind_integer(st, 2, c->attempt);
@@ -156,13 +157,14 @@ static int finish(database *db, void *arg) {
     sql_bind_text(st, 4, end->problem);
     sql_bind_integer(st, 5, end->now);
     sql_bind_text(st, 6, end->mesh ? end->mesh : "");
+    sql_bind_integer(st, 7, end->started);
   }
-  int code = must_change(db, st);
+  int code = database_run_later(db, st, SQL_ONE_CHANGE);
   if (code == SQL_OK && end->result) {
-    code = resource_insert(db, end->result);
+    code = resource_insert(db, end->result, NULL);
   }
   if (code == SQL_OK && end->state == API_JOB_SUCCEEDED && !end->mesh) {
-    code = owner_of_job(db, c->id, end->now);
+    code = owner_of_job(db, c->id, end->now, end->result != NULL);
   }
   if (code == SQL_OK && end->worker_ms > 0) {
     code = usage_add_time(db, end->owner, end->worker_ms);

@@ -51,7 +51,12 @@ static int run(object_lock *l, const char *sql) {
 
 /* All locks of the connection are this one and its number. It may be a new connection, which has none. */
 static void let_all_go(object_lock *l) {
-  run(l, "SELECT pg_advisory_unlock_all()");
+  database_settle(&l->db);
+  sql_statement *st = database_statement(&l->db, "SELECT pg_advisory_unlock_all()");
+  if (st) {
+    sql_step(st);
+    sql_reset(st);
+  }
 }
 
 /* A connection that was made again has no locks. */
@@ -64,41 +69,53 @@ static int holds_any(object_lock *l) {
 }
 
 /* Waits for the deletions that nodes announced before they lost the lock. An announcement stands through its last
- * millisecond. 0: the database is unreachable. */
+ * millisecond. */
 static int wait_for_deletions(object_lock *l) {
   enum { LOOK_MS = 500 };
-  for (int64_t left = 1; left > 0;) {
+  int code = SQL_ROW;
+  for (int64_t left = 1; left > 0 && code == SQL_ROW;) {
     sql_statement *st =
         database_statement(&l->db, "SELECT coalesce(max(until)+1-clock_ms(), 0) FROM deletion WHERE until>=clock_ms()");
-    if (!st || sql_step(st) != SQL_ROW) {
-      sql_reset(st);
-      return 0;
-    }
-    left = sql_integer(st, 0);
+    code = st ? sql_step(st) : SQL_ERROR;
+    left = code == SQL_ROW ? sql_integer(st, 0) : 0;
     sql_reset(st);
     if (left > 0) {
       const int64_t ms = left < LOOK_MS ? left : LOOK_MS;
       nanosleep(&(struct timespec){0, (long)ms * 1000000}, NULL);
     }
   }
-  return 1;
+  return code == SQL_ROW ? SQL_OK : code == SQL_DONE ? SQL_ERROR : code;
+}
+
+/* Takes the lock and the number, in one round trip with the first question about deletions. */
+static int take_shared(object_lock *l) {
+  sql_statement *st = database_statement(&l->db, "SELECT pg_advisory_lock_shared(?1::int, hashtext(current_schema()))");
+  if (st) {
+    sql_bind_integer(st, 1, SQL_LOCK_OBJECTS);
+  }
+  int code = database_run_later(&l->db, st, SQL_ANY);
+  st = code == SQL_OK ? database_statement(&l->db, "SELECT pg_advisory_lock(?1)") : NULL;
+  if (st) {
+    sql_bind_integer(st, 1, l->number);
+    code = database_run_later(&l->db, st, SQL_ANY);
+  }
+  return code == SQL_OK && st ? wait_for_deletions(l) : code == SQL_OK ? SQL_ERROR : code;
 }
 
 /* Each time that sharing begins, it gets a new number, also if it does not get the lock: then nobody holds the number.
  */
 static int begin_sharing(object_lock *l) {
-  char sql[192];
   uint64_t random;
   randombytes_buf(&random, sizeof random);
   l->number = (int64_t)(random >> 1) | 1;
-  snprintf(sql, sizeof sql,
-           "SELECT pg_advisory_lock_shared(%d, hashtext(current_schema())); SELECT pg_advisory_lock(%lld)",
-           SQL_LOCK_OBJECTS, (long long)l->number);
-  int taken = run(l, sql) && wait_for_deletions(l);
-  if (!taken) {
+  int code = take_shared(l);
+  if (code == SQL_IOERR) { /* the connection was lost since its last use; it is made again */
+    code = take_shared(l);
+  }
+  if (code != SQL_OK) {
     let_all_go(l);
   }
-  return taken;
+  return code == SQL_OK;
 }
 
 int object_lock_share(object_lock *l) {
@@ -126,18 +143,11 @@ int64_t object_lock_number(void) {
 
 /* The number can be taken here only if the connection that held it is gone. */
 int object_lock_check(database *db, int64_t number) {
-  if (!number) {
-    return SQL_OK;
+  sql_statement *st = number ? database_statement(db, "SELECT pg_try_advisory_xact_lock(?1)::int") : NULL;
+  if (st) {
+    sql_bind_integer(st, 1, number);
   }
-  sql_statement *st = database_statement(db, "SELECT pg_try_advisory_xact_lock(?1)::int");
-  if (!st) {
-    return SQL_ERROR;
-  }
-  sql_bind_integer(st, 1, number);
-  int code = sql_step(st);
-  code = code == SQL_ROW ? (sql_integer(st, 0) ? SQL_LOST : SQL_OK) : code == SQL_DONE ? SQL_ERROR : code;
-  sql_reset(st);
-  return code;
+  return number ? database_run_later(db, st, SQL_ZERO) : SQL_OK;
 }
 
 /* The second lock is that of transactions (catalogue.c): a transaction that checked its lock before this one was free

@@ -19,7 +19,7 @@ static int owner_insert(database *db, const resource *r, const char *tenant, con
   sql_bind_integer(st, 5, resource_is_derived(r->kind) ? 0 : r->bytes);
   sql_bind_integer(st, 6, r->created);
   sql_bind_integer(st, 7, resource_is_derived(r->kind) ? r->bytes : 0);
-  return database_run(db, st);
+  return database_run_later(db, st, SQL_ANY);
 }
 
 /* Whether a query returns a row, with kind, id and text (unless NULL) bound. */
@@ -41,7 +41,7 @@ static int exists(database *db, const char *sql, int kind, const char *id, const
 }
 
 /* If the result existed before, this owner's description has the time of the owner's job. */
-int owner_of_job(database *db, const char *job, int64_t now) {
+int owner_of_job(database *db, const char *job, int64_t now, int made) {
   sql_statement *st = database_statement(
       db,
       "INSERT INTO owner(kind, id, tenant, json, bytes, created, derived)"
@@ -50,12 +50,14 @@ int owner_of_job(database *db, const char *job, int64_t now) {
       "   json_set(r.json, '$.created', strftime('%Y-%m-%dT%H:%M:%S', ?2/1000, 'unixepoch') ||"
       "    printf('.%03dZ', ?2%1000))), 0, ?2, r.bytes"
       " FROM job j JOIN resource r ON r.kind=j.kind+1 AND r.id=j.key WHERE j.id=?1 ON CONFLICT DO NOTHING");
-  int code = SQL_ERROR;
   if (st) {
     sql_bind_text(st, 1, job);
     sql_bind_integer(st, 2, now);
-    code = database_run(db, st);
   }
+  if (made) {
+    return database_run_later(db, st, SQL_ANY);
+  }
+  int code = database_run(db, st);
   if (code != SQL_OK || sql_changes(db) > 0) {
     return code;
   }
@@ -146,8 +148,8 @@ static int put(database *db, void *arg) {
   if (p->quota > 0 && bytes + p->row->bytes > p->quota) {
     return SQL_CONSTRAINT;
   }
-  code = resource_insert(db, p->row);
-  int first = sql_changes(db) > 0;
+  int first = 0;
+  code = resource_insert(db, p->row, &first);
   if (code == SQL_OK) {
     code = owner_insert(db, p->row, p->tenant, first ? NULL : p->row->json);
   }
@@ -169,8 +171,12 @@ typedef struct alignment_arg {
 
 static int put_alignment(database *db, void *arg) {
   const alignment_arg *a = arg;
-  int code = resource_remove(db, RESOURCE_ALIGNMENT, a->row->id);
-  code = code == SQL_OK || code == SQL_NOTFOUND ? resource_insert(db, a->row) : code;
+  sql_statement *st = database_statement(db, "DELETE FROM resource WHERE kind=4 AND id=?1");
+  if (st) {
+    sql_bind_text(st, 1, a->row->id);
+  }
+  int code = database_run_later(db, st, SQL_ANY);
+  code = code == SQL_OK ? resource_insert(db, a->row, NULL) : code;
   return code == SQL_OK ? owner_insert(db, a->row, a->tenant, NULL) : code;
 }
 
@@ -194,6 +200,60 @@ store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id
     sql_bind_text(st, 3, tenant);
   }
   return rows_one(cat, db, st, &resource_rows, out);
+}
+
+static int read_id(sql_statement *st, void *out) {
+  row_text(st, 0, out, API_ID_SIZE);
+  return 1;
+}
+
+/* In PostgreSQL with one question. */
+static store_result owns_at_once(catalogue *cat, resource_kind kind, char (*ids)[API_ID_SIZE], int count,
+                                 const char *tenant, int *owns) {
+  static const row_kind id_rows = {.read = read_id, .size = API_ID_SIZE};
+  api_text list = {0};
+  for (int i = 0; i < count; i++) {
+    api_text_printf(&list, "%s%s", i ? "," : "", ids[i]);
+  }
+  char(*found)[API_ID_SIZE] = list.failed ? NULL : calloc((size_t)count, sizeof *found);
+  int n = -1;
+  if (found) {
+    database *db = catalogue_reader(cat);
+    sql_statement *st =
+        database_statement(db, "SELECT id FROM owner WHERE kind=?3 AND tenant=?2 AND id=ANY(string_to_array(?1, ','))");
+    if (st) {
+      sql_bind_text(st, 1, list.data);
+      sql_bind_text(st, 2, tenant);
+      sql_bind_integer(st, 3, (int)kind);
+    }
+    n = rows_many(cat, db, st, &id_rows, found, count);
+  }
+  for (int i = 0; i < count; i++) {
+    for (int k = 0; k < n; k++) {
+      owns[i] |= strcmp(found[k], ids[i]) == 0;
+    }
+  }
+  api_text_free(&list);
+  free(found);
+  return n >= 0 ? STORE_OK : STORE_ERROR;
+}
+
+store_result catalogue_owns(catalogue *cat, resource_kind kind, char (*ids)[API_ID_SIZE], int count, const char *tenant,
+                            int *owns) {
+  memset(owns, 0, (size_t)count * sizeof *owns);
+  if (count > 0 && database_is_url(catalogue_path(cat))) {
+    return owns_at_once(cat, kind, ids, count, tenant, owns);
+  }
+  for (int i = 0; i < count; i++) {
+    resource known = {0};
+    store_result found = catalogue_get_of(cat, kind, ids[i], tenant, &known);
+    resource_free(&known);
+    owns[i] = found == STORE_OK;
+    if (found == STORE_ERROR) {
+      return found;
+    }
+  }
+  return STORE_OK;
 }
 
 int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit,
@@ -238,11 +298,6 @@ store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id
   store_result result = catalogue_write(cat, disown, &arg);
   *gone = result == STORE_OK && arg.gone;
   return result;
-}
-
-static int read_id(sql_statement *st, void *out) {
-  row_text(st, 0, out, API_ID_SIZE);
-  return 1;
 }
 
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant) {

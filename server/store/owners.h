@@ -17,7 +17,7 @@
 
 /* Functions with a database argument run inside a transaction of the writer. */
 /* Makes the owner of a job that succeeded an owner of its result. SQL_CONSTRAINT if the result does not exist. */
-int owner_of_job(database *db, const char *job, int64_t now);
+int owner_of_job(database *db, const char *job, int64_t now, int made);
 /* Makes the tenant that requests a job an owner of the meshes that it names, so that another owner's DELETE does not
  * remove them. SQL_NOTFOUND if `all` is set and a mesh does not exist. */
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all);
@@ -31,6 +31,9 @@ store_result catalogue_put_for(catalogue *cat, const resource *r, const char *te
 store_result catalogue_put_alignment(catalogue *cat, const resource *row, const char *tenant);
 /* The row with the description that this owner sees; STORE_NOT_FOUND if the tenant does not own it. */
 store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id, const char *tenant, resource *out);
+/* owns[i]: whether the tenant owns ids[i]; each id is named once. */
+store_result catalogue_owns(catalogue *cat, resource_kind kind, char (*ids)[API_ID_SIZE], int count, const char *tenant,
+                            int *owns);
 /* Like catalogue_list(), but lists only rows that the tenant owns. */
 int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit, resource *out);
 /* Removes an owner. *gone: it was the last one and the row is deleted. STORE_NOT_FOUND: the tenant did not own it. */

@@ -9,6 +9,7 @@
 
 #include "log.h"
 #include "store/postgresql_connection.h"
+#include "store/postgresql_pipeline.h"
 #include "store/sql.h"
 
 enum { PARAMETERS = 32, NUMBER = 24, OID_BIGINT = 20, OID_TEXT = 25 };
@@ -53,15 +54,27 @@ static int in_transaction(const sql_connection *c) {
 /* A statement that begins a transaction, or needs none, is repeated if the connection was lost. */
 static int execute(sql_connection *c, const char *sql) {
   pgsql_connection *to = c->native;
-  int within = in_transaction(c), code = within ? SQL_OK : pgsql_restore(to);
+  int within = in_transaction(c), code = pgsql_settle(to, NULL);
+  code = code != SQL_OK || within ? code : pgsql_restore(to);
   code = code == SQL_OK ? pgsql_run(to, sql, NULL) : code;
   if (code != SQL_OK && !within && pgsql_is_lost(to) && (code = pgsql_restore(to)) == SQL_OK) {
     code = pgsql_run(to, sql, NULL);
   }
-  if (code != SQL_OK && !sql_postgresql_is_away()) {
+  if (code != SQL_OK && code != SQL_CONSTRAINT && code != SQL_LOST && !sql_postgresql_is_away()) {
     log_error("catalogue: %.60s: %s", sql, to->message);
   }
   return code;
+}
+
+static int begin(sql_connection *c) {
+  pgsql_connection *to = c->native;
+  int code = pgsql_settle(to, NULL);
+  code = code == SQL_OK ? pgsql_restore(to) : code;
+  return code == SQL_OK ? pgsql_send_begin(to, to->writer == SQL_SHARES) : code;
+}
+
+static int settle(sql_connection *c) {
+  return pgsql_settle(c->native, NULL);
 }
 
 static const char *message(const sql_connection *c) {
@@ -123,6 +136,7 @@ static void drop_result(statement *st) {
 static void finish(sql_statement *s) {
   statement *st = s->native;
   if (st) {
+    pgsql_forget(st->c, &st->generation);
     drop_result(st);
     free(st->sql);
     free(st);
@@ -161,13 +175,17 @@ static void bind_integer(sql_statement *s, int parameter, int64_t value) {
   }
 }
 
+static void settle_types(statement *st) {
+  for (int i = 0; i < st->parameters; i++) {
+    st->types[i] = st->types[i] ? st->types[i] : OID_TEXT;
+  }
+}
+
 static int prepare_on_server(statement *st) {
   if (st->generation == st->c->generation) {
     return SQL_OK;
   }
-  for (int i = 0; i < st->parameters; i++) {
-    st->types[i] = st->types[i] ? st->types[i] : OID_TEXT;
-  }
+  settle_types(st);
   PGresult *result = PQprepare(st->c->server, st->name, st->sql, st->parameters, st->types);
   int code = pgsql_is_fine(result) ? SQL_OK : pgsql_failed(st->c, result);
   PQclear(result);
@@ -191,9 +209,31 @@ static int run_prepared(statement *st) {
   return SQL_OK;
 }
 
+static int send(statement *st, sql_expect expect) {
+  int code = SQL_OK;
+  if (st->generation != st->c->generation) {
+    settle_types(st);
+    code = pgsql_send_prepare(st->c, st->name, st->sql, st->parameters, st->types, &st->generation);
+  }
+  return code == SQL_OK ? pgsql_send(st->c, st->name, st->parameters, st->values, expect) : code;
+}
+
+static int later(sql_statement *s, sql_expect expect) {
+  statement *st = s->native;
+  pgsql_connection *c = st->c;
+  int code = c->sent || pgsql_is_within(c) ? SQL_OK : pgsql_restore(c);
+  code = code == SQL_OK ? send(st, expect) : code;
+  reset(s);
+  return code;
+}
+
 /* A query outside of transactions is repeated if the connection was lost: it only reads. */
 static int first_step(statement *st) {
   pgsql_connection *c = st->c;
+  if (c->sent) {
+    int code = send(st, SQL_ANY);
+    return code == SQL_OK ? pgsql_settle(c, &st->result) : code;
+  }
   int within = pgsql_is_within(c), code = within ? SQL_OK : pgsql_restore(c);
   code = code == SQL_OK ? run_prepared(st) : code;
   if (code != SQL_OK && !within && pgsql_is_lost(c) && (code = pgsql_restore(c)) == SQL_OK) {
@@ -252,6 +292,7 @@ const sql_driver sql_postgresql = {
     .message = message,
     .out_of_memory = out_of_memory,
     .execute = execute,
+    .begin = begin,
     .in_transaction = in_transaction,
     .version = version,
     .exclude = exclude,
@@ -264,6 +305,8 @@ const sql_driver sql_postgresql = {
     .bind_text = bind_text,
     .bind_integer = bind_integer,
     .step = step,
+    .later = later,
+    .settle = settle,
     .is_null = is_null,
     .integer = integer,
     .text = text,

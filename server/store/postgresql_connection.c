@@ -180,7 +180,7 @@ void sql_postgresql_note(int is_away) {
 }
 
 int pgsql_is_lost(const pgsql_connection *c) {
-  return PQstatus(c->server) != CONNECTION_OK;
+  return c->broken || PQstatus(c->server) != CONNECTION_OK;
 }
 
 int pgsql_restore(pgsql_connection *c) {
@@ -193,6 +193,7 @@ int pgsql_restore(pgsql_connection *c) {
     return refuse(c, SQL_IOERR, "the database does not answer");
   }
   PQreset(c->server);
+  c->broken = 0;
   __atomic_store_n(&tried, now_ms(), __ATOMIC_RELAXED);
   int code = PQstatus(c->server) == CONNECTION_OK ? begin(c) : pgsql_failed(c, NULL);
   sql_postgresql_note(PQstatus(c->server) != CONNECTION_OK); /* pgbouncer takes connections also without the server */
@@ -213,7 +214,7 @@ int pgsql_restore(pgsql_connection *c) {
 
 int pgsql_is_within(const pgsql_connection *c) {
   PGTransactionStatusType status = PQtransactionStatus(c->server);
-  return status == PQTRANS_INTRANS || status == PQTRANS_INERROR;
+  return c->begun || status == PQTRANS_INTRANS || status == PQTRANS_INERROR;
 }
 
 int pgsql_open(const char *where, int writer, pgsql_connection **out) {

@@ -9,6 +9,8 @@
 #include <libpq-fe.h>
 #include <stdint.h>
 
+enum { PGSQL_SENT = 64 };
+
 typedef struct pgsql_connection {
   PGconn *server;
   int writer, out_of_memory;
@@ -16,6 +18,13 @@ typedef struct pgsql_connection {
   int generation; /* counts connections: statements are prepared again on each */
   int statements; /* counts them, for their names */
   int64_t changes, holder;
+  int broken;      /* of no use, whatever its socket says */
+  int waits_on;    /* the generation that the wait for other nodes is prepared on */
+  int sent, begun; /* statements in flight (postgresql_pipeline.h); whether BEGIN is one of them */
+  struct {
+    int expect;    /* sql_expect */
+    int *prepares; /* a PREPARE: gets the generation of the connection, or 0 if it fails */
+  } in_flight[PGSQL_SENT];
   char message[400]; /* of the last error */
 } pgsql_connection;
 

@@ -45,21 +45,29 @@ int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]) {
   return count;
 }
 
-int resource_insert(database *db, const resource *r) {
+static sql_statement *insert_statement(database *db, const resource *r) {
   sql_statement *st = database_statement(db,
                                          "INSERT INTO resource(kind, id, sha, json, bytes, created, used, places)"
                                          " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?6, ?7) ON CONFLICT(kind, id) DO NOTHING");
-  if (!st) {
-    return SQL_ERROR;
+  if (st) {
+    sql_bind_integer(st, 1, (int)r->kind);
+    sql_bind_text(st, 2, r->id);
+    sql_bind_text(st, 3, r->sha);
+    sql_bind_text(st, 4, r->json);
+    sql_bind_integer(st, 5, r->bytes);
+    sql_bind_integer(st, 6, r->created);
+    sql_bind_text(st, 7, r->places);
   }
-  sql_bind_integer(st, 1, (int)r->kind);
-  sql_bind_text(st, 2, r->id);
-  sql_bind_text(st, 3, r->sha);
-  sql_bind_text(st, 4, r->json);
-  sql_bind_integer(st, 5, r->bytes);
-  sql_bind_integer(st, 6, r->created);
-  sql_bind_text(st, 7, r->places);
-  return database_run(db, st);
+  return st;
+}
+
+int resource_insert(database *db, const resource *r, int *fresh) {
+  if (!fresh) {
+    return database_run_later(db, insert_statement(db, r), SQL_ANY);
+  }
+  int code = database_run(db, insert_statement(db, r));
+  *fresh = code == SQL_OK && sql_changes(db) > 0;
+  return code;
 }
 
 static int read_row(sql_statement *st, void *to) {
@@ -91,6 +99,56 @@ store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, r
     sql_bind_text(st, 2, id);
   }
   return rows_one(cat, db, st, &resource_rows, out);
+}
+
+/* In PostgreSQL with one question. */
+static store_result get_at_once(catalogue *cat, const resource_key *keys, int count, resource *out) {
+  api_text ids = {0};
+  int found = 0;
+  for (int i = 0; i < count; i++) {
+    api_text_printf(&ids, "%s%s", i ? "," : "", keys[i].id);
+  }
+  resource *rows = ids.failed ? NULL : calloc(RESOURCE_KINDS * (size_t)count, sizeof *rows);
+  if (rows) {
+    database *db = catalogue_reader(cat);
+    sql_statement *st = database_statement(
+        db, "SELECT " COLUMNS " FROM resource WHERE kind IN (0, 1, 2, 3, 4) AND id=ANY(string_to_array(?1, ','))");
+    if (st) {
+      sql_bind_text(st, 1, ids.data);
+    }
+    found = rows_many(cat, db, st, &resource_rows, rows, RESOURCE_KINDS * count);
+  }
+  for (int i = 0; i < count; i++) {
+    for (int k = 0; k < found; k++) {
+      if (rows[k].json && rows[k].kind == keys[i].kind && strcmp(rows[k].id, keys[i].id) == 0) {
+        out[i] = rows[k];
+        rows[k].json = NULL;
+      }
+    }
+  }
+  for (int k = 0; k < found; k++) {
+    resource_free(&rows[k]);
+  }
+  api_text_free(&ids);
+  store_result result = rows && found >= 0 ? STORE_OK : STORE_ERROR;
+  free(rows);
+  return result;
+}
+
+store_result catalogue_get_all(catalogue *cat, const resource_key *keys, int count, resource *out) {
+  memset(out, 0, (size_t)count * sizeof *out);
+  if (count > 0 && database_is_url(catalogue_path(cat))) {
+    return get_at_once(cat, keys, count, out);
+  }
+  for (int i = 0; i < count; i++) {
+    if (catalogue_get(cat, keys[i].kind, keys[i].id, &out[i]) == STORE_ERROR) {
+      while (i > 0) {
+        resource_free(&out[--i]);
+      }
+      return STORE_ERROR;
+    }
+  }
+  return STORE_OK;
 }
 
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out) {
@@ -154,7 +212,7 @@ static int touch_row(database *db, void *arg) {
   sql_bind_integer(st, 1, key->kind);
   sql_bind_text(st, 2, key->id);
   sql_bind_integer(st, 3, key->now);
-  return database_run(db, st);
+  return database_run_later(db, st, SQL_ANY);
 }
 
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {

@@ -11,7 +11,8 @@
 
 /* These run inside a transaction of the writer. */
 int event_insert(database *db, const char *job, int64_t number, const char *type, const char *json);
-int resource_insert(database *db, const resource *r);                       /* keeps an existing row */
+/* Keeps an existing row. *fresh: whether there was none; NULL: the caller does not ask. */
+int resource_insert(database *db, const resource *r, int *fresh);
 int resource_remove(database *db, resource_kind kind, const char *id);      /* SQL_NOTFOUND: no such row */
 int job_insert(database *db, job_row *row, const struct job_webhook *hook); /* sets row->seq; hook NULL: none */
 

@@ -5,8 +5,8 @@
 #include "store/deliveries.h"
 #include "store/rows.h"
 
-/* Estimate of a job's time, charged until the time is known, as queue/schedule.c does within a process. The trigger
- * job_used of postgresql_schema.c replaces it. */
+/* Estimate of a job's time, charged until the time is known, as queue/schedule.c does within a process. Triggers of
+ * postgresql_schema.c charge it (job_claimed) and replace it (job_used, job_ended). */
 #define ESTIMATE(job) "(10+" job ".cost/100)"
 
 /* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner. Owners with ready jobs, each
@@ -49,18 +49,19 @@ static const char pick_computing[] =
          FIRST("kind<>2") " UNION ALL " SMALLEST("kind<>2") " LIMIT 1");
 static const char pick_fetching[] = PICK("true", FIRST("kind=2"));
 
-/* Also takes a job that was picked before the transaction: another node may have claimed it since, or a job with its
- * key. */
+/* Takes the job ?1, which was picked before the transaction: another node may have claimed it since, or a job with its
+ * key. Jobs that wait for it are shown as running from now on. All parts see the sums as they were before. */
 static const char take[] =
-    "UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(), alone=suspect,"
-    " started=CASE WHEN started=0 AND kind<>1 THEN clock_ms() ELSE started END" /* 1: catalogue_job_begin() */
-    " WHERE id=(SELECT id FROM job WHERE id=?1 AND state=0 AND waits=0 FOR UPDATE SKIP LOCKED LIMIT 1)"
-    " AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=job.key AND o.state=1)";
-
-/* Jobs that wait for this one are shown as running from now on. */
-static const char show_waiting[] =
-    "UPDATE job d SET started=clock_ms() FROM job j JOIN need n ON n.key=j.key AND n.owner=j.owner"
-    " WHERE j.id=?1 AND d.id=n.job AND d.started=0";
+    "WITH taken AS (UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(), alone=suspect,"
+    "  started=CASE WHEN started=0 AND kind<>1 THEN clock_ms() ELSE started END" /* 1: catalogue_job_begin() */
+    "  WHERE id=(SELECT id FROM job WHERE id=?1 AND state=0 AND waits=0 FOR UPDATE SKIP LOCKED LIMIT 1)"
+    "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=job.key AND o.state=1) RETURNING *),"
+    " shown AS (UPDATE job d SET started=clock_ms() FROM taken j JOIN need n ON n.key=j.key AND n.owner=j.owner"
+    "  WHERE d.id=n.job AND d.started=0)"
+    " SELECT " JOB_COLUMNS
+    ", (SELECT coalesce(max(number), 0) FROM event e WHERE e.job=taken.id), big, cancel,"
+    " (SELECT sum(ready)-1 FROM turn), (SELECT coalesce(sum(ready), 0) FROM turn WHERE owner<>taken.owner), ready"
+    " FROM taken";
 
 typedef struct claim_arg {
   const claim_wish *wish;
@@ -103,15 +104,14 @@ static int run_for(database *db, const char *sql, const char *first, const char 
   return database_run(db, st);
 }
 
-static int read_claimed(database *db, const char *id, job_claim *out) {
-  sql_statement *st =
-      database_statement(db, "SELECT " JOB_COLUMNS
-                             ", (SELECT coalesce(max(number), 0) FROM event e WHERE e.job=job.id), big, cancel,"
-                             " (SELECT coalesce(sum(ready), 0) FROM turn), ready FROM job WHERE id=?1");
+static int take_one(database *db, const claim_arg *a, const char *id) {
+  job_claim *out = a->out;
+  sql_statement *st = database_statement(db, take);
   if (!st) {
     return SQL_ERROR;
   }
   sql_bind_text(st, 1, id);
+  sql_bind_text(st, 2, a->wish->node);
   int code = sql_step(st);
   if (code == SQL_ROW) {
     code = job_rows.read(st, &out->row) ? SQL_OK : SQL_NOMEM;
@@ -119,18 +119,14 @@ static int read_claimed(database *db, const char *id, job_claim *out) {
     out->big = sql_int(st, 22);
     out->cancel = sql_int(st, 23);
     out->beside = sql_integer(st, 24);
-    out->ready = sql_integer(st, 25);
+    out->others = sql_integer(st, 25);
+    out->ready = sql_integer(st, 26);
   }
   sql_reset(st);
   if (code == SQL_NOMEM) {
     job_row_free(&out->row);
   }
-  return code;
-}
-
-static int take_one(database *db, const claim_arg *a, const char *id) {
-  int code = run_for(db, take, id, a->wish->node);
-  return code == SQL_OK && sql_changes(db) != 1 ? SQL_NOTFOUND : code;
+  return code == SQL_DONE ? SQL_NOTFOUND : code;
 }
 
 static int claim_next(database *db, void *arg) {
@@ -144,13 +140,7 @@ static int claim_next(database *db, void *arg) {
     code = pick_one(db, a->wish, id);
     code = code == SQL_OK ? take_one(db, a, id) : code;
   }
-  code = code == SQL_OK ? run_for(db, show_waiting, id, NULL) : code;
-  code = code == SQL_OK ? read_claimed(db, id, a->out) : code;
-  return code == SQL_OK ? run_for(db,
-                                  "UPDATE turn t SET service=t.service+" ESTIMATE(
-                                      "j") " FROM job j WHERE j.id=?1 AND j.kind<>2 AND t.owner=j.owner",
-                                  id, NULL)
-                        : code;
+  return code;
 }
 
 /* Picks outside the transaction, for which all nodes wait. The query takes longer than the rest of the claim. */
@@ -322,13 +312,16 @@ static int begin(database *db, void *arg) {
   }
   sql_bind_text(st, 1, r->id);
   sql_bind_integer(st, 2, r->attempt);
-  return database_run(db, st);
+  return database_run_later(db, st, SQL_ANY);
 }
 
-store_result catalogue_job_begin(catalogue *cat, const char *id, int attempt) {
-  job_row row = {.attempt = attempt};
-  snprintf(row.id, sizeof row.id, "%s", id);
-  return catalogue_write(cat, begin, &row);
+void catalogue_job_begin(catalogue *cat, const char *id, int attempt) {
+  job_row *row = calloc(1, sizeof *row);
+  if (row) {
+    row->attempt = attempt;
+    snprintf(row->id, sizeof row->id, "%s", id);
+    catalogue_write_gathered(cat, begin, row);
+  }
 }
 
 static int release_big(database *db, void *arg) {

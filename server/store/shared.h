@@ -29,6 +29,7 @@ typedef struct job_claim {
   int big, cancel;
   int64_t ready;  /* since when it could be claimed, Unix time in ms of the database's clock */
   int64_t beside; /* other jobs that are ready to run */
+  int64_t others; /* those of them that other owners have */
 } job_claim;
 /* Claims the next job. STORE_NOT_FOUND: there is none for this node. */
 store_result catalogue_claim_next(catalogue *cat, const claim_wish *wish, job_claim *out);
@@ -58,8 +59,9 @@ typedef struct job_needs {
   int64_t now;
 } job_needs;
 store_result catalogue_job_wait(catalogue *cat, const job_needs *needs);
-/* Shows a claimed supermesh as running, which catalogue_claim_next() does for other jobs. */
-store_result catalogue_job_begin(catalogue *cat, const char *id, int attempt);
+/* Shows a claimed supermesh as running, which catalogue_claim_next() does for other jobs: soon, with its first events.
+ */
+void catalogue_job_begin(catalogue *cat, const char *id, int attempt);
 /* Like catalogue_job_release(), and the job needs all memory of a node from now on. */
 store_result catalogue_job_release_big(catalogue *cat, const char *id, int attempt);
 /* Asks for a job to be cancelled, and notifies the node that runs it. */

@@ -33,6 +33,13 @@ enum sql_code {
 };
 const char *sql_reason(int code); /* in words */
 
+/* What must hold of a statement whose result is looked at later. */
+typedef enum sql_expect {
+  SQL_ANY,
+  SQL_ONE_CHANGE, /* it changes one row; else SQL_CONSTRAINT */
+  SQL_ZERO        /* its only row has the integer 0; else SQL_LOST */
+} sql_expect;
+
 typedef struct sql_connection {
   const struct sql_driver *driver;
   void *native;
@@ -56,6 +63,9 @@ typedef struct sql_driver {
   const char *(*message)(const sql_connection *c);    /* of the last error */
   int (*out_of_memory)(const sql_connection *c);      /* whether that was the last error */
   int (*execute)(sql_connection *c, const char *sql); /* any number of statements, without parameters; logs errors */
+  /* Begins a transaction that writes: with SQL_SHARES, after those of other nodes. It may be sent with the first
+   * statement. */
+  int (*begin)(sql_connection *c);
   int (*in_transaction)(const sql_connection *c);
   int (*version)(sql_connection *c, int *version); /* of the schema; 0: there is none */
   /* Of the connection that writes: keeps all other daemons out until hold(). SQL_BUSY: another one is connected. */
@@ -71,6 +81,11 @@ typedef struct sql_driver {
   void (*bind_text)(sql_statement *st, int parameter, const char *text);
   void (*bind_integer)(sql_statement *st, int parameter, int64_t value);
   int (*step)(sql_statement *st);
+  /* Runs a statement whose result nobody waits for, and resets it. A driver may send it together with the next ones.
+   * Then its error, or SQL_CONSTRAINT or SQL_LOST where it is not as expected, comes from the step(), execute() or
+   * settle() that follows. What changes() returns after it is undefined. */
+  int (*later)(sql_statement *st, sql_expect expect);
+  int (*settle)(sql_connection *c); /* waits for such statements; SQL_OK, or the first error */
   /* Of the row, columns from 0. */
   int (*is_null)(sql_statement *st, int column);
   int64_t (*integer)(sql_statement *st, int column);
@@ -97,6 +112,9 @@ static inline void sql_bind_integer(sql_statement *st, int parameter, int64_t va
 }
 static inline int sql_step(sql_statement *st) {
   return st->driver->step(st);
+}
+static inline int sql_later(sql_statement *st, sql_expect expect) {
+  return st->driver->later(st, expect);
 }
 static inline void sql_reset(sql_statement *st) { /* NULL: nothing to reset */
   if (st) {

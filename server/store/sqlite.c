@@ -123,6 +123,27 @@ static int step(sql_statement *st) {
   return code_of(sqlite3_step(st->native));
 }
 
+static int begin(sql_connection *c) {
+  return execute(c, "BEGIN IMMEDIATE");
+}
+
+static int later(sql_statement *st, sql_expect expect) {
+  sqlite3_stmt *native = st->native;
+  int code = step(st);
+  const int lost = code == SQL_ROW && expect == SQL_ZERO && sqlite3_column_int64(native, 0) != 0;
+  reset(st);
+  code = code == SQL_ROW || code == SQL_DONE ? SQL_OK : code;
+  return code != SQL_OK                                                                ? code
+         : lost                                                                        ? SQL_LOST
+         : expect == SQL_ONE_CHANGE && sqlite3_changes(sqlite3_db_handle(native)) != 1 ? SQL_CONSTRAINT
+                                                                                       : SQL_OK;
+}
+
+static int settle(sql_connection *c) {
+  (void)c;
+  return SQL_OK;
+}
+
 static int is_null(sql_statement *st, int column) {
   return sqlite3_column_type(st->native, column) == SQLITE_NULL;
 }
@@ -167,6 +188,7 @@ const sql_driver sql_sqlite = {
     .message = message,
     .out_of_memory = out_of_memory,
     .execute = execute,
+    .begin = begin,
     .in_transaction = in_transaction,
     .version = version,
     .exclude = exclude,
@@ -179,6 +201,8 @@ const sql_driver sql_sqlite = {
     .bind_text = bind_text,
     .bind_integer = bind_integer,
     .step = step,
+    .later = later,
+    .settle = settle,
     .is_null = is_null,
     .integer = integer,
     .text = text,

@@ -23,6 +23,11 @@ void catalogue_write_later(struct catalogue *cat, write_fn fn, void *arg);
  * catalogue, to be committed with others. All writes keep their order. */
 void catalogue_write_gathered(struct catalogue *cat, write_fn fn, void *arg);
 
+/* The same, and if the last waiting write has this fn, join(its argument, arg) may take arg over instead: it returns 1,
+ * or 0. What it returns, arg belongs to this function. */
+void catalogue_write_joined(struct catalogue *cat, write_fn fn, void *arg, int (*join)(void *waiting, void *arg),
+                            void (*release)(void *arg));
+
 const char *catalogue_path(const struct catalogue *cat);
 
 database *catalogue_reader(struct catalogue *cat); /* waits until one is free */

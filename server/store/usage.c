@@ -69,7 +69,7 @@ int usage_add_time(database *db, const char *tenant, int64_t ms) {
   }
   sql_bind_text(st, 1, tenant);
   sql_bind_integer(st, 2, ms);
-  return database_run(db, st);
+  return database_run_later(db, st, SQL_ANY);
 }
 
 typedef struct time_arg {

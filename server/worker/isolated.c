@@ -16,78 +16,70 @@
 #include "store/object_removal.h"
 #include "store/verify.h"
 
-enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, COPY_BYTES = 16 << 20 };
+enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 2, COPY_BYTES = 16 << 20 };
 
 /* Asset, places and spheres. */
 enum { OBJECTS_MOST = 3 };
 
 typedef struct collected {
-  input_head heads[INPUTS_MOST];
-  char *json[INPUTS_MOST];
+  resource_key keys[INPUTS_MOST];
+  object_kind objects[INPUTS_MOST];
+  resource rows[INPUTS_MOST]; /* without JSON: there is no such row */
   int fds[INPUTS_MOST], count;
   char alignment[API_ID_SIZE]; /* the id of the one that the job takes or keeps; "": none */
   int64_t bytes;
 } collected;
 
-/* Adds a row and its object. It leaves out what does not exist, and the process reports what it lacks. */
-static void collect(const run_env *env, collected *all, resource_kind kind, object_kind object, const char *id) {
-  resource row = {0};
-  uint64_t size;
+/* Adds a row, once, and its object. */
+static void want(collected *all, resource_kind kind, object_kind object, const char *id) {
   int at = all->count;
   for (int i = 0; i < at; i++) {
-    if (all->heads[i].row == kind && strcmp(all->heads[i].id, id) == 0) {
+    if (all->keys[i].kind == kind && strcmp(all->keys[i].id, id) == 0) {
       return;
     }
   }
-  if (at == INPUTS_MOST || catalogue_get(env->cat, kind, id, &row) != STORE_OK) {
-    return;
+  if (at < INPUTS_MOST) {
+    all->keys[at].kind = kind;
+    snprintf(all->keys[at].id, sizeof all->keys[at].id, "%s", id);
+    all->objects[at] = object;
+    all->fds[at] = -1;
+    all->count++;
   }
-  all->heads[at] = (input_head){.row = kind, .object = object};
-  memcpy(all->heads[at].id, row.id, sizeof row.id);
-  memcpy(all->heads[at].sha, row.sha, sizeof row.sha);
-  all->json[at] = row.json;
-  row.json = NULL;
-  resource_free(&row);
-  all->fds[at] = -1;
-  if (objects_read(env->store, object, id, &all->fds[at], &size) == STORE_OK) {
-    all->bytes += (int64_t)size;
-  }
-  all->count++;
 }
 
 static void let_go(collected *all) {
   for (int i = 0; i < all->count; i++) {
-    free(all->json[i]);
+    resource_free(&all->rows[i]);
     if (all->fds[i] >= 0) {
       close(all->fds[i]);
     }
   }
 }
 
-/* The inputs that the request names. A request that does not decode has none: the process reports that. */
-static void collect_all(const run_env *env, api_job_kind kind, const char *text, collected *all) {
+/* The result of the job comes first. Then the inputs that the request names: a request that does not decode has none,
+ * and the process reports that. */
+static void want_all(api_job_kind kind, const run_job *j, collected *all) {
   api_json_error error;
   api_problem ignored = {0};
-  cJSON *body = api_json_parse(text, strlen(text), &error);
+  cJSON *body = api_json_parse(j->request, strlen(j->request), &error);
   api_supermesh_request merge;
   api_embedding_request one;
   memset(&merge, 0, sizeof merge);
+  want(all, kind == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH, OBJECT_KINDS, j->key);
   if (body && kind == API_JOB_EMBEDDING && api_embedding_request_read(body, &one, &ignored)) {
-    collect(env, all, RESOURCE_MESH, OBJECT_MESH, one.mesh);
+    want(all, RESOURCE_MESH, OBJECT_MESH, one.mesh);
   } else if (body && kind == API_JOB_SUPERMESH && api_supermesh_request_read(body, &merge, &ignored)) {
     for (int32_t s = 0; s < merge.shape_count; s++) {
       api_embedding_request wanted = {.options = merge.embedding};
       char embedding[API_ID_SIZE];
       memcpy(wanted.mesh, merge.shapes[s].mesh, sizeof wanted.mesh);
-      collect(env, all, RESOURCE_MESH, OBJECT_MESH, wanted.mesh);
+      want(all, RESOURCE_MESH, OBJECT_MESH, wanted.mesh);
       if (api_embedding_request_id(&wanted, embedding)) {
-        collect(env, all, RESOURCE_EMBEDDING, OBJECT_SPHERE, embedding);
-        catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);
+        want(all, RESOURCE_EMBEDDING, OBJECT_SPHERE, embedding);
       }
     }
     if (api_alignment_id(&merge, all->alignment)) {
-      collect(env, all, RESOURCE_ALIGNMENT, OBJECT_ALIGNMENT, all->alignment);
-      catalogue_touch(env->cat, RESOURCE_ALIGNMENT, all->alignment);
+      want(all, RESOURCE_ALIGNMENT, OBJECT_ALIGNMENT, all->alignment);
     } else {
       all->alignment[0] = 0;
     }
@@ -97,13 +89,35 @@ static void collect_all(const run_env *env, api_job_kind kind, const char *text,
   cJSON_Delete(body);
 }
 
+/* Opens the objects of the inputs that exist. */
+static void open_all(const run_env *env, collected *all) {
+  for (int i = 1; i < all->count; i++) {
+    uint64_t size;
+    if (!all->rows[i].json) {
+      continue;
+    }
+    if (objects_read(env->store, all->objects[i], all->keys[i].id, &all->fds[i], &size) == STORE_OK) {
+      all->bytes += (int64_t)size;
+    }
+    if (resource_is_derived(all->keys[i].kind)) {
+      catalogue_touch(env->cat, all->keys[i].kind, all->keys[i].id);
+    }
+  }
+}
+
 static channel_result send_all(isolated *p, const task_head *task, const char *request, const collected *all) {
   const struct iovec begin[2] = {{(void *)(uintptr_t)task, sizeof *task},
                                  {(void *)(uintptr_t)request, strlen(request)}};
   channel_result result = isolate_send(p, FRAME_TASK, begin, 2, -1);
-  for (int i = 0; i < all->count && result == CHANNEL_OK; i++) {
-    const struct iovec parts[2] = {{(void *)(uintptr_t)&all->heads[i], sizeof all->heads[i]},
-                                   {all->json[i], strlen(all->json[i])}};
+  for (int i = 1; i < all->count && result == CHANNEL_OK; i++) {
+    const resource *row = &all->rows[i];
+    input_head head = {.row = all->keys[i].kind, .object = all->objects[i]};
+    memcpy(head.id, all->keys[i].id, sizeof head.id);
+    memcpy(head.sha, row->sha, sizeof head.sha);
+    if (!row->json) { /* the process reports what it lacks */
+      continue;
+    }
+    const struct iovec parts[2] = {{&head, sizeof head}, {row->json, strlen(row->json)}};
     result = isolate_send(p, FRAME_INPUT, parts, 2, all->fds[i]);
   }
   return result == CHANNEL_OK ? isolate_send(p, FRAME_GO, NULL, 0, -1) : result;
@@ -256,15 +270,15 @@ static void let_go_of_made(const run_env *env, run_output *out) {
  * embedding lost its row. */
 static int quarantine_inputs(const run_env *env, const collected *all) {
   int gone = 0;
-  for (int i = 0; i < all->count; i++) {
+  for (int i = 1; i < all->count; i++) {
     resource row = {0};
-    if (all->heads[i].object == OBJECT_ALIGNMENT) { /* a wrong one is computed again */
+    if (!all->rows[i].sha[0] || all->objects[i] == OBJECT_ALIGNMENT) { /* a wrong one is computed again */
       continue;
     }
-    verify_again(env->store, all->heads[i].object, all->heads[i].id, all->heads[i].sha);
+    verify_again(env->store, all->objects[i], all->keys[i].id, all->rows[i].sha);
     objects_settle(env->store); /* the scrub may have moved it */
-    gone |= all->heads[i].object == OBJECT_SPHERE &&
-            catalogue_get(env->cat, RESOURCE_EMBEDDING, all->heads[i].id, &row) == STORE_NOT_FOUND;
+    gone |= all->objects[i] == OBJECT_SPHERE &&
+            catalogue_get(env->cat, RESOURCE_EMBEDDING, all->keys[i].id, &row) == STORE_NOT_FOUND;
     resource_free(&row);
   }
   return gone;
@@ -272,19 +286,18 @@ static int quarantine_inputs(const run_env *env, const collected *all) {
 
 int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j,
                  const isolated_limits *limits, run_output *out, api_problem *problem, isolated_end *end) {
-  resource known = {0};
   isolated process;
   collected inputs = {.alignment = ""};
   *end = (isolated_end){.status = -1};
-  resource_kind made = kind == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
-  if (catalogue_get(env->cat, made, j->key, &known) == STORE_OK) {
-    resource_free(&known); /* of an earlier attempt or another owner */
-    return 1;
+  want_all(kind, j, &inputs);
+  catalogue_get_all(env->cat, inputs.keys, inputs.count,
+                    inputs.rows);                  /* if they cannot be read, the process lacks them */
+  const int is_made = inputs.rows[0].json != NULL; /* by an earlier attempt, or for another owner */
+  if (is_made || !isolate_open(&process, ctx)) {
+    let_go(&inputs);
+    return is_made ? 1 : api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
   }
-  if (!isolate_open(&process, ctx)) {
-    return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
-  }
-  collect_all(env, kind, j->request, &inputs);
+  open_all(env, &inputs);
   task_head task = {.kind = kind == API_JOB_EMBEDDING ? TASK_EMBEDDING : TASK_SUPERMESH,
                     .threads = limits->threads,
                     .nice = limits->nice,

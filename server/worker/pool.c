@@ -57,31 +57,51 @@ static int64_t triangles_of(const run_env *env, const char *mesh) {
   return triangles;
 }
 
-/* Adds the embedding of a shape if it is missing. 0: the store failed, or out of memory. */
-static int add_if_missing(const run_env *env, const job *j, const api_supermesh_request *request, int32_t s,
-                          missing *list) {
-  api_embedding_request wanted = {.options = request->embedding};
-  char *key = list->keys[list->count];
-  memcpy(wanted.mesh, request->shapes[s].mesh, sizeof wanted.mesh);
-  if (!api_embedding_request_id(&wanted, key)) {
+/* The embeddings that the shapes need, each once. 0: out of memory. */
+static int need_all(const api_supermesh_request *request, missing *list, char (*meshes)[API_ID_SIZE]) {
+  for (int32_t s = 0; s < request->shape_count; s++) {
+    api_embedding_request wanted = {.options = request->embedding};
+    char *key = list->keys[list->count];
+    int k = 0;
+    memcpy(wanted.mesh, request->shapes[s].mesh, sizeof wanted.mesh);
+    if (!api_embedding_request_id(&wanted, key)) {
+      return 0;
+    }
+    while (k < list->count && strcmp(list->keys[k], key) != 0) {
+      k++;
+    }
+    if (k == list->count) {
+      memcpy(meshes[k], wanted.mesh, sizeof wanted.mesh);
+      list->count++;
+    }
+  }
+  return 1;
+}
+
+/* Leaves those that are missing. An embedding that only others own is requested for this owner too; its job finds the
+ * result and ends at once. 0: the store failed, or out of memory. */
+static int keep_missing(const run_env *env, const job *j, const api_supermesh_request *request, missing *list) {
+  char meshes[API_SHAPES_MAX][API_ID_SIZE];
+  int owns[API_SHAPES_MAX], kept = 0, fine = 1;
+  if (!need_all(request, list, meshes) ||
+      catalogue_owns(env->cat, RESOURCE_EMBEDDING, list->keys, list->count, job_owner(j), owns) != STORE_OK) {
+    list->count = 0;
     return 0;
   }
   for (int k = 0; k < list->count; k++) {
-    if (strcmp(list->keys[k], key) == 0) {
-      return 1;
+    if (owns[k]) {
+      continue;
     }
+    api_embedding_request wanted = {.options = request->embedding};
+    memcpy(wanted.mesh, meshes[k], sizeof wanted.mesh);
+    memmove(list->keys[kept], list->keys[k], sizeof list->keys[k]);
+    list->costs[kept] = triangles_of(env, meshes[k]);
+    api_text *text = &list->texts[kept++];
+    api_embedding_request_write(&wanted, text);
+    fine &= !text->failed;
   }
-  /* An embedding that only others own is requested for this owner too; its job finds the result and ends at once. */
-  resource known = {0};
-  store_result found = catalogue_get_of(env->cat, RESOURCE_EMBEDDING, key, job_owner(j), &known);
-  resource_free(&known);
-  if (found == STORE_ERROR || found == STORE_OK) {
-    return found == STORE_OK;
-  }
-  list->costs[list->count] = triangles_of(env, wanted.mesh);
-  api_text *text = &list->texts[list->count++];
-  api_embedding_request_write(&wanted, text);
-  return !text->failed;
+  list->count = kept;
+  return fine;
 }
 
 /* Makes a supermesh wait for the embeddings that it lacks. 1: it now waits; 0: it lacks none; −1: the store failed or
@@ -96,9 +116,7 @@ static int plan(const run_env *env, job *j) {
   memset(&request, 0, sizeof request);
   cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
   if (body && api_supermesh_request_read(body, &request, &problem)) { /* else run_supermesh() reports the error */
-    for (int32_t s = 0; s < request.shape_count && result == 0; s++) {
-      result = add_if_missing(env, j, &request, s, &list) ? 0 : -1;
-    }
+    result = keep_missing(env, j, &request, &list) ? 0 : -1;
   }
   for (int i = 0; i < list.count; i++) {
     requests[i] = list.texts[i].data;

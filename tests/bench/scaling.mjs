@@ -9,8 +9,11 @@
 // what the nodes really had, and says whether they waited for the database and S3 instead. ORB_KIND is what is asked ORB_JOBS (200)
 // times for each number of nodes, ORB_NODES (1,2,4): "embedding" (the default) of 20,480 triangles, "morph" of two embedded
 // shapes of 1,280 each, or "rotate", the same with align.method rotate. Each ORB_LEVEL less than 5 (3 for morphs) has a quarter of these
-// triangles. ORBMORPHD names the daemon. Beside other work, `chrt -f 1` before the command gives the stores their time first; the
-// nodes that are measured drop that priority.
+// triangles. Each node has ORB_WORKERS (1) workers. ORBMORPHD names the daemon, TMPDIR where the nodes have their folders. Beside other
+// work, `chrt -f 1` before the command gives the stores their time first; the nodes that are measured drop that priority.
+//
+// "ms a job" is processor time, whose sum bounds what the cores can do; "rest" is the node that serves and this program. "others" is
+// what programs had that have nothing to do with it. With ORB_STATEMENTS=1 the statements that ran most follow.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, writeFileSync } from 'node:fs';
@@ -96,6 +99,30 @@ function cost(catalogue) {
   return text.split('|').slice(1).map(Number);
 }
 
+const stores = path.dirname(process.env.ORB_S3_START);
+
+/** Seconds of processor time of the S3 server, which may be several processes. */
+function s3() {
+  const cluster = path.join(stores, 'data/cluster');
+  const more = existsSync(cluster) ? readFileSync(cluster, 'utf8').trim().split('\n').map(Number) : [];
+  return [Number(process.env.ORB_S3_PID), ...more].reduce((sum, pid) => sum + cpu(pid), 0);
+}
+
+/** How many requests radosgw has logged; Swift logs none. */
+function requests() {
+  const log = path.join(stores, 'data/client.log');
+  return existsSync(log) ? readFileSync(log, 'latin1').split(' HTTP/1.1" ').length - 1 : 0;
+}
+
+/** Seconds that the cores of this machine have been busy. */
+function busy() {
+  const [, user, nice, system, , , irq, soft] = readFileSync('/proc/stat', 'latin1')
+    .split('\n')[0]
+    .split(/ +/)
+    .map(Number);
+  return (user + nice + system + irq + soft) / 100;
+}
+
 /** The process of the server, whose children are its connections. */
 function postmaster(catalogue) {
   const [pid] = sql(catalogue, "SELECT pid FROM pg_stat_activity WHERE backend_type='checkpointer' /* bench */").split(
@@ -131,6 +158,14 @@ async function ask(serve, start) {
     });
 }
 
+/** The statements that were run most, for those who want to make them fewer (ORB_STATEMENTS=1). */
+const top = () =>
+  sql(
+    process.env.ORB_POSTGRESQL,
+    `SELECT round(calls/${jobs}.0, 2), round(total_exec_time::numeric/${jobs}, 3), left(regexp_replace(query, '\\s+', ' ', 'g'), 150)` +
+      " FROM public.pg_stat_statements WHERE query NOT LIKE '%/* bench */%' ORDER BY calls DESC LIMIT 45 /* bench */",
+  );
+
 async function measure(count) {
   const name = `scaling${process.pid}-${count}`;
   const catalogue = execFileSync(process.env.ORB_NEW_CATALOGUE, [name], { encoding: 'utf8' });
@@ -147,30 +182,44 @@ async function measure(count) {
   try {
     const serve = await start([], '--role', 'serve');
     await ask(serve, start);
-    const before = cost(catalogue);
-    const server = postmaster(catalogue);
-    const spent = cpu(server);
+    sql(process.env.ORB_POSTGRESQL, 'SELECT public.pg_stat_statements_reset() /* bench */');
     const works = [];
     for (let i = 0; i < count; i++) {
       groups.push(held(`orbmorph-${name}-${i}`));
       const enter = ['chrt', '-o', '0', '/bin/sh', '-c', `echo $$ >${groups[i].processes} && exec "$0" "$@"`];
-      works.push(await start(enter, '--role', 'work', '--workers', '1'));
+      works.push(await start(enter, '--role', 'work', '--workers', process.env.ORB_WORKERS ?? '1'));
     }
     const roots = works.map(({ child }) => child.pid);
-    const had = roots.map(cpu);
+    const server = postmaster(catalogue);
+    // Seconds of the nodes, PostgreSQL, S3, all that this program started (the node that serves, psql), and the machine.
+    const spent = () => {
+      const had = roots.map(cpu);
+      const sum = had.reduce((one, other) => one + other, 0);
+      return { had, seconds: [sum, cpu(server), s3(), cpu(process.pid) - sum, busy()], at: Date.now() };
+    };
     // The database knows when the last job ended: asking it more often would take time from the nodes.
     const ended = () =>
       sql(
         catalogue,
         `SELECT count(*), max(finished) FROM job WHERE state=2 AND kind=${kind === 'embedding' ? 0 : 1} /* bench */`,
       ).split('|');
+    const before = cost(catalogue);
+    const asked = requests();
+    const started = spent();
     const began = Date.now();
     const first = Number(ended()[0]);
     while (Number(ended()[0]) < jobs) await new Promise((done) => setTimeout(done, 1000));
-    const got = roots.map((root, i) => ((cpu(root) - had[i]) * 1000) / (Date.now() - began));
-    const each = cost(catalogue).map((value, i) => (value - before[i]) / jobs);
-    each.push((1000 * (cpu(server) - spent)) / jobs);
-    return { rate: (1000 * (jobs - first)) / (Number(ended()[1]) - began), got, each };
+    const end = spent();
+    const wall = (end.at - started.at) / 1000;
+    const done = jobs - first;
+    const used = end.seconds.map((value, i) => value - started.seconds[i]);
+    return {
+      rate: (1000 * done) / (Number(ended()[1]) - began),
+      got: end.had.map((value, i) => (value - started.had[i]) / wall),
+      each: [...cost(catalogue).map((value, i) => (value - before[i]) / done), (requests() - asked) / done],
+      ms: used.slice(0, 4).map((seconds) => (1000 * seconds) / done),
+      others: (used[4] - used[0] - used[1] - used[2] - used[3]) / wall,
+    };
   } finally {
     for (const node of nodes) {
       if (node.child) await node.stop();
@@ -181,20 +230,21 @@ async function measure(count) {
 }
 
 console.log(
-  '| nodes | jobs a second | times one | got, of a core | statements a job | transactions a job | rows a job | WAL a job | its CPU a job |\n|---|---|---|---|---|---|---|---|---|',
+  '| nodes | jobs a second | times one | got, of a core | others, of a core | ms a job: nodes | PostgreSQL | S3 | rest | statements a job | transactions | rows | WAL | S3 requests |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|',
 );
 sql(process.env.ORB_POSTGRESQL, 'CREATE EXTENSION IF NOT EXISTS pg_stat_statements');
 let one;
 let missed = 0;
 for (const count of counts) {
-  const { rate, got, each } = await measure(count);
+  const { rate, got, each, ms, others } = await measure(count);
   one ??= rate;
   const times = rate / one;
   missed += times < (GOALS.get(count) ?? 0);
-  const [statements, transactions, rows, wal, server] = each.map((value) => value.toFixed(0));
+  const [statements, transactions, rows, wal, s3s] = each.map((value) => value.toFixed(value < 10 ? 1 : 0));
   const shares = got.map((value) => value.toFixed(2)).join(' ');
   console.log(
-    `| ${count} | ${rate.toFixed(2)} | ${times.toFixed(2)} | ${shares} | ${statements} | ${transactions} | ${rows} | ${wal} B | ${server} ms |`,
+    `| ${count} | ${rate.toFixed(2)} | ${times.toFixed(2)} | ${shares} | ${others.toFixed(2)} | ${ms.map((value) => value.toFixed(1)).join(' | ')} | ${statements} | ${transactions} | ${rows} | ${wal} B | ${s3s} |`,
   );
+  if (process.env.ORB_STATEMENTS) console.log(top());
 }
 process.exitCode = missed ? 1 : 0;

@@ -44,6 +44,27 @@ osd_pool_default_pg_num = 1
 osd_pool_default_pg_autoscale_mode = off
 rgw_data = $folder
 rgw_thread_pool_size = 32
+# By default Ceph also formats lines that it would only log after a crash.
+debug_rgw = 1/1
+debug_osd = 0/0
+debug_ms = 0/0
+debug_rados = 0/0
+debug_objecter = 0/0
+debug_objclass = 0/0
+debug_bluestore = 0/0
+debug_filestore = 0/0
+debug_monc = 0/0
+debug_mon = 0/0
+debug_paxos = 0/0
+debug_throttle = 0/0
+debug_finisher = 0/0
+debug_timer = 0/0
+debug_optracker = 0/0
+debug_auth = 0/0
+debug_objectcacher = 0/0
+debug_perfcounter = 0/0
+debug_tp = 0/0
+osd_enable_op_tracker = false
 END
   monmaptool --create --fsid "$fsid" --addv a "$monitor" "$folder/monmap"
   ceph-mon --mkfs -i a --monmap "$folder/monmap"

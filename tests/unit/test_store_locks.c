@@ -168,7 +168,9 @@ static void *exclude(void *argument) {
 /* A transaction that may have read while the lock was held: it goes on until a caller waits for its end. */
 static int wait_within(database *db, void *argument) {
   excluder *e = argument;
-  (void)db;
+  if (database_settle(db) != SQL_OK) { /* until then it may not have begun */
+    return SQL_ERROR;
+  }
   if (pthread_create(&e->thread, NULL, exclude, e) != 0) {
     return SQL_ERROR;
   }
