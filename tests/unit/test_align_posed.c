@@ -148,11 +148,11 @@ static void many_true_landmarks_do_not_spoil_a_pose(void **state) {
 }
 
 /* A generated body in a pose, with its own triangles. place: of each sample; triangle −1: the body lacks it. */
-static void generate(orb_context *ctx, const char *kind, const char *pose, unsigned seed, body *out,
+static void generate(orb_context *ctx, const char *kind, const char *build, const char *pose, unsigned seed, body *out,
                      posed_place *place) {
   posed_rest rest;
   orb_sample sample;
-  posed_proportion(posed_find(kind), "", &rest);
+  posed_proportion(posed_find(kind), build, &rest);
   posed_polygonise(&rest, seed, &sample);
   posed_find_places(&rest, &sample, place);
   posed_skin(&rest, pose, &sample);
@@ -181,19 +181,18 @@ static void keep_common(const posed_place *place[2], int samples, body bodies[2]
   }
 }
 
-/* A giraffe stands and runs. A walk with these landmarks has 1.6 times the error of the match without any. */
-static void few_true_landmarks_do_not_spoil_a_match(void **state) {
-  (void)state;
+/* The mean errors between two animals of one kind, relative to the diagonal: without landmarks, and with the first FEW
+ * true places. */
+static void errors_of(const char *kind, const char *const build[2], const char *const pose[2], double error[2]) {
   const int samples = posed_sample_count();
   posed_place *place[2];
   body bodies[2];
   orb_context *ctx;
-  double error[2];
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
   for (int s = 0; s < 2; s++) {
     place[s] = calloc((size_t)samples, sizeof **place);
     assert_non_null(place[s]);
-    generate(ctx, "giraffe", s ? "run" : "stand", (unsigned)s + 1, &bodies[s], place[s]);
+    generate(ctx, kind, build[s], pose[s], (unsigned)s + 1, &bodies[s], place[s]);
   }
   keep_common((const posed_place *[2]){place[0], place[1]}, samples, bodies);
   assert_true(bodies[0].count > 100);
@@ -221,12 +220,32 @@ static void few_true_landmarks_do_not_spoil_a_match(void **state) {
     error[given] = mean_error(ctx, bodies, FEW, &out);
     orb_alignment_free(ctx, &out);
   }
-  print_message("error without landmarks %.4f, with %d of them %.4f\n", error[0], FEW, error[1]);
-  assert_true(error[0] <= 0.008);
-  assert_true(error[1] <= 1.05 * error[0]);
+  print_message("%s: error without landmarks %.4f, with %d of them %.4f\n", kind, error[0], FEW, error[1]);
   free(place[0]);
   free(place[1]);
   unload(ctx, bodies);
+}
+
+/* A giraffe stands and runs. A walk with these landmarks has 1.6 times the error of the match without any. */
+static void few_true_landmarks_do_not_spoil_a_match(void **state) {
+  (void)state;
+  double error[2];
+  errors_of("giraffe", (const char *const[2]){"", ""}, (const char *const[2]){"stand", "run"}, error);
+  assert_true(error[0] <= 0.008);
+  assert_true(error[1] <= 1.05 * error[0]);
+}
+
+/* A person walks, and turns. The given spheres of the two correspond well, so the map without landmarks begins on them.
+ * If it did not slide then, its error would be 0.0071. */
+static void maps_on_the_given_spheres_slide(void **state) {
+  (void)state;
+#ifdef __SANITIZE_ADDRESS__
+  skip(); /* the giraffe runs the same code */
+#endif
+  double error[2];
+  errors_of("person", (const char *const[2]){"", ""}, (const char *const[2]){"walk", "turn"}, error);
+  assert_true(error[0] <= 0.006);
+  assert_true(error[1] <= 0.006);
 }
 
 /* One body is twisted. A match that exchanges left with right and front with back would move places by half a body. */
@@ -300,6 +319,7 @@ static void distances_tell_a_pose(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(many_true_landmarks_do_not_spoil_a_pose),
                                      cmocka_unit_test(few_true_landmarks_do_not_spoil_a_match),
+                                     cmocka_unit_test(maps_on_the_given_spheres_slide),
                                      cmocka_unit_test(a_twist_is_matched), cmocka_unit_test(distances_tell_a_pose)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
