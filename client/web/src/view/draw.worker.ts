@@ -283,15 +283,39 @@ function draw(width: number, height: number, frames: Frame[]) {
   }
 }
 
+type Drawing = Extract<Order, { op: 'draw' }>;
+let next: Drawing | null = null;
+let pending = 0; // animation frames until the browser has taken the last drawing
+
+/**
+ * Draws at once, or, while the browser has not taken the last drawing, in its next animation frame. So the page prepares
+ * a drawing meanwhile, and no animation frame passes without one: where the GPU is slow, it lasts as long as a drawing.
+ */
+function drawNow({ width, height, frames }: Drawing, until: number) {
+  draw(width, height, frames);
+  send({ op: 'drawn' });
+  pending = until;
+}
+
+function taken() {
+  if (--pending === 0) send({ op: 'shown' });
+  const drawing = next;
+  next = null;
+  if (drawing) drawNow(drawing, 1);
+  if (pending) requestAnimationFrame(taken);
+}
+
 function execute(order: Order) {
   if (order.op === 'start') return start(order.canvas, order.ratio);
-  if (order.op === 'draw')
-    return void requestAnimationFrame(() => {
-      draw(order.width, order.height, order.frames);
-      send({ op: 'drawn' });
-      // the next animation frame starts after the browser has taken this one
-      requestAnimationFrame(() => send({ op: 'shown' }));
-    });
+  if (order.op === 'draw') {
+    if (pending) {
+      next = order;
+      return;
+    }
+    drawNow(order, 2); // between animation frames: the browser may take it only after the next one has begun
+    requestAnimationFrame(taken);
+    return;
+  }
   if (order.op === 'model') {
     const buffers = order.surface ? new Buffers(order.surface) : models.get(order.same!)?.buffers;
     if (buffers) models.set(order.model, new Model(buffers.take(), order.paint, order.scale));
