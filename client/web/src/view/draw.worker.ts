@@ -291,26 +291,29 @@ let pending = 0; // animation frames until the browser has taken the last drawin
  * Draws at once, or, while the browser has not taken the last drawing, in its next animation frame. So the page prepares
  * a drawing meanwhile, and no animation frame passes without one: where the GPU is slow, it lasts as long as a drawing.
  */
-function drawNow({ width, height, frames }: Drawing) {
+function drawNow({ width, height, frames }: Drawing, until: number) {
   draw(width, height, frames);
   send({ op: 'drawn' });
-  if (!pending) requestAnimationFrame(taken);
-  pending = 2; // what is drawn between animation frames may be taken after the next one has begun
+  pending = until;
 }
 
 function taken() {
+  if (--pending === 0) send({ op: 'shown' });
   const drawing = next;
   next = null;
-  if (--pending) requestAnimationFrame(taken);
-  if (drawing) drawNow(drawing);
-  else if (!pending) send({ op: 'shown' });
+  if (drawing) drawNow(drawing, 1);
+  if (pending) requestAnimationFrame(taken);
 }
 
 function execute(order: Order) {
   if (order.op === 'start') return start(order.canvas, order.ratio);
   if (order.op === 'draw') {
-    if (pending) next = order;
-    else drawNow(order);
+    if (pending) {
+      next = order;
+      return;
+    }
+    drawNow(order, 2); // between animation frames: the browser may take it only after the next one has begun
+    requestAnimationFrame(taken);
     return;
   }
   if (order.op === 'model') {
