@@ -49,6 +49,7 @@ test('landmarks are stored once, read, listed and deleted', async (t) => {
   const page = (await d.get('/v1/landmarks?limit=1')).json;
   assert.equal((await d.get(`/v1/landmarks?limit=1&page_token=${page.next_page_token}`)).json.landmarks[0].id, id);
   assert.equal((await d.delete(url)).status, 204);
+  await d.gone(url);
   assertProblem(await d.get(url), 404, 'not-found');
   assert.equal((await d.get('/v1/landmarks')).json.landmarks.length, 1);
 });
@@ -88,6 +89,7 @@ test('a supermesh with landmarks by id is the one with the same landmarks in pla
   assert.equal(byId.landmarks.length, file.landmarks.length);
   // The supermesh does not depend on the resource.
   await d.delete(`/v1/landmarks/${id}`);
+  await d.gone(`/v1/landmarks/${id}`);
   assert.equal((await d.get(byId.url)).status, 200);
   for (const [landmarks, status, type] of [
     [{ id }, 404, 'not-found'],

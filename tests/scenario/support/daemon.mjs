@@ -140,6 +140,16 @@ export class Daemon {
     return options;
   }
 
+  /** The same for a resource that was deleted. A single daemon must know at once, so there this waits for nothing. */
+  async gone(url, options) {
+    if (!process.env.ORB_NODES) return;
+    let gone = 0;
+    await until(async () => {
+      gone = (await this.get(url, options)).status === 404 ? gone + 1 : 0;
+      return gone >= Number(process.env.ORB_NODES);
+    }, 'all nodes know that it is deleted');
+  }
+
   async request(method, target, { body, headers, query, signal } = {}) {
     const url = new URL(target, this.url);
     for (const [name, value] of Object.entries(query ?? {})) url.searchParams.set(name, value);
