@@ -9,16 +9,16 @@
  *   rotate/  method `rotate`: rotations of whole spheres, by landmarks or by search
  *   pin/     method `pin`: landmarks as constraints of the embeddings
  *   rbf/     method `rbf`: the warp of Peng & Timalsena 2016
- *   map/     the composed map, from one shape through the sphere to the other, and its optimiser
+ *   map/     the composed map, from one shape through the sphere to the other, and its optimiser; map/rims/: rims of
+ *            filled holes that correspond, which lie on each other afterwards
  *   find/    matches, without landmarks or in agreement with them; given landmarks that may be misplaced
  *            (find/suspects.h)
- *   rims/    rims of filled holes that correspond, which lie on each other afterwards
  *   given.c  one method with the given landmarks, then the composed map; soft landmarks are released at the end
  *   auto.c   method `auto`: the rotation search, composed towards the matches of find/
  *   align.c  orb_align(): checks the request, chooses between given.c and auto.c, and aligns copies of large shapes
  *
  * The main header of each folder says what comes in, what goes out, and in which order to read its files:
- * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, find/match.h.
+ * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, map/rims/rims.h, find/match.h.
  */
 #ifndef ORB_ALIGN_METHODS_H
 #define ORB_ALIGN_METHODS_H

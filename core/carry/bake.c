@@ -277,7 +277,7 @@ orb_status orb_bake_refuse(orb_context *ctx) {
   orb_status status =
       orb_fail(ctx, ORB_E_BAD_OPTION,
                "\"transfer\" bakes a texture into the texture coordinates of the first shape, which has none. "
-               "Unwrap it, or leave \"texture\" out.");
+               "Unwrap it, or omit \"texture\".");
   orb_context_error_edit(ctx)->shape = 0;
   return status;
 }

@@ -55,7 +55,7 @@ static orb_status refuse_image(orb_context *ctx, const orb_mesh *mesh, const orb
   const int number = (int)(material - mesh->materials);
   orb_status status = orb_fail(ctx, ORB_E_BAD_OPTION,
                                "The base colour of material %d cannot be decoded as PNG or JPEG of at most "
-                               "%d pixels a side. Mend it, or leave \"texture\" of \"transfer\" out.",
+                               "%d pixels a side. Convert the image, or omit \"texture\" from \"transfer\".",
                                number, (int)ORB_IMAGE_SIDE_MAX);
   orb_error *error = orb_context_error_edit(ctx);
   orb_error_element *element = &error->elements[0];

@@ -35,7 +35,7 @@ enum {
   MAP_ROUNDS = 2,    /* along the rough map alone; 8 change little */
   PLACE_ROUNDS = 6,  /* to the nearest places; 10 rank maps no better, and let wrong ones catch up */
   SLIDE_ROUNDS = 10, /* 20 come no nearer to the truth */
-  TURNS = 2,         /* of rotations and positions in a round */
+  ALTERNATIONS = 2,  /* of rotations and positions in a round */
   SURROUNDINGS = 4, /* a vertex takes its first rotation from the images of its surroundings, one vertex in this many of
                        the mesh. With one in 16, a limb's girth and as much of its length, noise of the rough map stays
                        as twists: of 20 pairs, the right map then bends the shapes least in 17 instead of 19, and by a
@@ -44,6 +44,7 @@ enum {
 };
 /* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
 static const double MAP_REACH = 0.6, FIRST_REACH = 0.6, LAST_REACH = 0.06;
+/* A pose to settle is carried from copies, and is off by about one of their edges. */
 static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
 /* A slide follows the relief as far as the last reach lets it: with 0.06 people stay a twentieth farther from the
  * truth. First ones of 0.2 to 0.6 are as good. */
@@ -354,7 +355,7 @@ static orb_status follow_places(registration *r, int rounds, double first, doubl
     }
     pull_by_place(r, 1 / (reach * reach));
     pull_by_anchors(r);
-    for (int k = 0; k < TURNS; k++) {
+    for (int k = 0; k < ALTERNATIONS; k++) {
       ORB_TRY(solve(r, k == 0));
       fit_surroundings(r);
     }

@@ -1,9 +1,9 @@
 /* Non-rigid registration of one surface to another, as rigid as possible.
  *
- * In: two meshes of up to ten thousand vertices or so, and a rough map between them or places where the first one lies
- * already. Out: where the first one goes so that it lies on the second, and how much that bends it. A rough map of the
- * right limbs bends little, even if it misses their tips by a little. A map of the wrong limbs bends much. So the cost
- * ranks maps. Read in this order:
+ * In: two meshes, the first one of up to ten thousand vertices or so, and a rough map between them or places where the
+ * first one lies already. Out: where the first one goes so that it lies on the second, and how much that bends it. A
+ * rough map of the right limbs bends little, even if it misses their tips by a little. A map of the wrong limbs bends
+ * much. So the cost ranks maps. Read in this order:
  *
  *   searched.h  vertices, laid out for searches of the nearest one
  *   body.h      a mesh with what the steps read

@@ -6,13 +6,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "numeric/vec3.h"
 
 enum {
   BLOCK = 256,     /* vertices of one task */
-  STEPS_MOST = 200 /* of conjugate gradients; a guard: 7,000 vertices take 5 to 20, and 186,000 take 46 to 157 */
+  STEPS_MOST = 200 /* of conjugate gradients: 7,000 vertices take 5 to 20, and 186,000 take 46 to 157. After these steps
+                      only what is far wider than the surroundings is left, and heights hardly change */
 };
 /* The residual at which they end, relative to the first one. With 0.001, people come no nearer to the truth. */
 static const double SETTLED = 1e-2;
@@ -148,7 +151,8 @@ static void step_blocks(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-static void turn_blocks(void *arg, int64_t begin, int64_t end, int thread) {
+/* The next direction. */
+static void redirect_blocks(void *arg, int64_t begin, int64_t end, int thread) {
   heat *h = arg;
   (void)thread;
   for (int32_t v = (int32_t)begin * BLOCK; v < block_end(h, end - 1); v++) {
@@ -170,7 +174,7 @@ static void sum_blocks(orb_context *ctx, heat *h, orb_loop_fn body, double total
   }
 }
 
-static void smooth(orb_context *ctx, heat *h) {
+static orb_status smooth(orb_context *ctx, heat *h) {
   double first[3], last[3], now[3], curvature[3];
   sum_blocks(ctx, h, begin_blocks, first);
   memcpy(last, first, sizeof last);
@@ -180,8 +184,9 @@ static void smooth(orb_context *ctx, heat *h) {
       settled = settled && !(last[k] > SETTLED * SETTLED * first[k]);
     }
     if (settled) {
-      return;
+      break;
     }
+    ORB_TRY(orb_context_check(ctx));
     sum_blocks(ctx, h, multiply_blocks, curvature);
     for (int k = 0; k < 3; k++) {
       h->along[k] = curvature[k] > 0 ? last[k] / curvature[k] : 0;
@@ -191,12 +196,13 @@ static void smooth(orb_context *ctx, heat *h) {
       h->again[k] = last[k] > 0 ? now[k] / last[k] : 0;
     }
     memcpy(last, now, sizeof last);
-    orb_parallel_for(ctx, block_count(h->body), 1, turn_blocks, h);
+    orb_parallel_for(ctx, block_count(h->body), 1, redirect_blocks, h);
   }
+  return ORB_OK;
 }
 
 /* Gives the heights of one size mean 0 and variance 1 over the surface. */
-static void normalise(const orb_body *b, double *height, double size) {
+static void standardize(const orb_body *b, double *height, double size) {
   double mass = ORB_TINY, sum = 0, squares = 0;
   for (int32_t v = 0; v < b->count; v++) {
     const double h = height[ORB_RELIEF_SIZES * (size_t)v];
@@ -232,22 +238,23 @@ static orb_status heat_create(orb_context *ctx, const orb_body *body, heat *h) {
 }
 
 /* Fills the heights against surroundings of one size. place, normal: room for 3 per vertex. */
-static void fill_heights(orb_context *ctx, heat *h, double size, double *place, double *normal, double *height) {
+static orb_status fill_heights(orb_context *ctx, heat *h, double size, double *place, double *normal, double *height) {
   const orb_body *b = h->body;
   h->time = size * size / 4;
   h->in = b->mesh->positions;
   h->out = place;
-  smooth(ctx, h);
+  ORB_TRY(smooth(ctx, h));
   h->in = b->normal;
   h->out = normal;
-  smooth(ctx, h);
+  ORB_TRY(smooth(ctx, h));
   for (int32_t v = 0; v < b->count; v++) {
     double out[3], *n = normal + 3 * (size_t)v;
     (void)orb_normalize(n);
     orb_sub(b->mesh->positions + 3 * (size_t)v, place + 3 * (size_t)v, out);
     height[ORB_RELIEF_SIZES * (size_t)v] = orb_dot(out, n);
   }
-  normalise(b, height, size);
+  standardize(b, height, size);
+  return ORB_OK;
 }
 
 /* The slope at a vertex is the mean of the gradients on its triangles, by their areas. area: zeroed room, one per
@@ -291,7 +298,7 @@ orb_status orb_relief_create(orb_context *ctx, const orb_body *body, double grai
   const size_t n = (size_t)body->count;
   double *place = ORB_NEW(ctx, double, 3 * n), *normal = ORB_NEW(ctx, double, 3 * n), *area = ORB_NEW0(ctx, double, n);
   heat h = {0};
-  out->height = ORB_NEW(ctx, double, ORB_RELIEF_SIZES *n);
+  out->height = ORB_NEW(ctx, double, n *ORB_RELIEF_SIZES);
   out->slope = wants_slope ? ORB_NEW(ctx, double, 3 * ORB_RELIEF_SIZES * n) : NULL;
   orb_status status = heat_create(ctx, body, &h);
   if (!place || !normal || !area || !out->height || (wants_slope && !out->slope)) {
@@ -299,7 +306,7 @@ orb_status orb_relief_create(orb_context *ctx, const orb_body *body, double grai
   }
   double size = fmax(SMALLEST, EDGES * grain);
   for (int s = 0; s < ORB_RELIEF_SIZES && status == ORB_OK; s++, size *= 2) {
-    fill_heights(ctx, &h, size, place, normal, out->height + s);
+    status = fill_heights(ctx, &h, size, place, normal, out->height + s);
   }
   if (status == ORB_OK && wants_slope) {
     fill_slopes(body, out->height, area, out->slope);

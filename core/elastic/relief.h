@@ -21,8 +21,9 @@ ORB_MUST_CHECK orb_status orb_relief_create(orb_context *ctx, const orb_body *bo
                                             orb_relief *out);
 void orb_relief_free(orb_context *ctx, orb_relief *relief);
 
-/* How far, from a point near vertex u of b, a vertex of these heights lies along the surface of b: one damped
- * Gauss–Newton step towards the same heights. from: the point, relative to u. normal: of b at u. */
+/* The step along b's surface, from a point near vertex u, towards the place where b has these heights. One damped
+ * Gauss–Newton step, shortened to 0.4 of its length and to 0.04 radii at most. from: the point, relative to u. normal:
+ * of b at u. */
 void orb_relief_step(const double *height, const orb_relief *b, int32_t u, const double from[3], const double normal[3],
                      double step[3]);
 

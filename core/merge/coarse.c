@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"
+#include "merge/torn.h"
 #include "numeric/vec3.h"
 
 enum { GRAIN = 256 };             /* samples or triangles a thread takes at a time */
@@ -112,7 +113,7 @@ static orb_status measure(orb_context *ctx, coarse_job *job) {
   return ORB_OK;
 }
 
-static orb_status measure_shape(orb_context *ctx, const orb_merge_result *merged, int32_t s, const int32_t *number,
+static orb_status measure_shape(orb_context *ctx, const orb_merge_result *merged, int32_t s, const orb_mesh *repaired,
                                 double limit, orb_coarse *out) {
   const orb_supermesh *supermesh = &merged->supermesh;
   const orb_mesh *input = &merged->alignment.shapes[s].mesh;
@@ -129,11 +130,13 @@ static orb_status measure_shape(orb_context *ctx, const orb_merge_result *merged
                                   supermesh->places + (int64_t)s * supermesh->vertex_count, supermesh->vertex_count,
                                   positions),
            done);
+    double moved;
+    orb_torn_close(repaired, supermesh, positions, &moved);
     ORB_GO(status, orb_nearest_create(ctx, input->positions, input->triangles, input->triangle_count, &on_input), done);
     ORB_GO(status, orb_nearest_create(ctx, positions, supermesh->triangles, supermesh->triangle_count, &on_made), done);
     coarse_job job = {input, supermesh, positions, on_input, on_made, worst2, nearest, far2};
     ORB_GO(status, measure(ctx, &job), done);
-    judge(&job, number, limit, out);
+    judge(&job, repaired->source_triangle, limit, out);
   }
 done:
   orb_nearest_destroy(ctx, on_input);
@@ -145,7 +148,7 @@ done:
   return status;
 }
 
-orb_status orb_report_coarse(orb_context *ctx, const int32_t *number, double tolerance, orb_merge_result *out) {
+orb_status orb_report_coarse(orb_context *ctx, const orb_mesh *repaired, double tolerance, orb_merge_result *out) {
   int32_t shape_count = out->supermesh.shape_count;
   out->coarse = ORB_NEW0(ctx, orb_coarse, shape_count);
   if (!out->coarse) {
@@ -154,7 +157,7 @@ orb_status orb_report_coarse(orb_context *ctx, const int32_t *number, double tol
   for (int32_t s = 1; s < shape_count; s++) {
     double limit = tolerance * out->shapes[s].diagonal;
     if (!(out->shapes[s].hausdorff <= limit)) {
-      ORB_TRY(measure_shape(ctx, out, s, number, limit, &out->coarse[s]));
+      ORB_TRY(measure_shape(ctx, out, s, repaired, limit, &out->coarse[s]));
     }
   }
   return ORB_OK;

@@ -12,6 +12,7 @@
 #include "carry/check.h"
 #include "merge/coarse.h"
 #include "merge/report.h"
+#include "merge/torn.h"
 #include "mesh/refuse.h"
 #include "orbmorph/utf8.h"
 #include "transfer/holes.h"
@@ -58,7 +59,8 @@ static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shap
     orb_progress(ctx, "transfer", 0.8 * (s + 1) / shape_count);
   }
   if (is_template) {
-    ORB_TRY(orb_report_coarse(ctx, number, remesh->tolerance, out));
+    ORB_TRY(orb_report_torn(ctx, shapes[0].mesh, out));
+    ORB_TRY(orb_report_coarse(ctx, shapes[0].mesh, remesh->tolerance, out));
   }
   ORB_TRY(orb_report_landmarks(ctx, shapes, landmarks, out));
   ORB_TRY(orb_report_found(ctx, shapes, out));
@@ -91,9 +93,8 @@ static orb_document document_of(const orb_merge_options *options) {
 
 /* Parts of a document are named, and the first shape has none: the error lists them. */
 static orb_status refuse_parts(orb_context *ctx, const orb_document_parts *parts) {
-  orb_status status =
-      orb_fail(ctx, ORB_E_BAD_OPTION,
-               "\"template\" names meshes or nodes, but the first shape is not glTF; leave that member out.");
+  orb_status status = orb_fail(
+      ctx, ORB_E_BAD_OPTION, "\"template\" names meshes or nodes, but the first shape is not glTF; omit that member.");
   orb_error *error = orb_context_error_edit(ctx);
   error->shape = 0;
   error->element_total = (int64_t)parts->mesh_count + parts->node_count;

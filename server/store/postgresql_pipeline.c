@@ -96,7 +96,11 @@ int pgsql_settle(pgsql_connection *c, PGresult **last) {
   if (c->sent == 0) {
     return SQL_OK;
   }
-  int code = PQpipelineSync(c->server) ? SQL_OK : pgsql_failed(c, NULL);
+  int code = SQL_OK;
+  if (!PQpipelineSync(c->server)) { /* the server sends nothing then, and results would never come */
+    code = pgsql_failed(c, NULL);
+    c->broken = 1;
+  }
   for (int i = 0; i < c->sent; i++) {
     PGresult *result = pgsql_is_lost(c) ? NULL : take(c);
     const int failed = !result || !pgsql_is_fine(result);

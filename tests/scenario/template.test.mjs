@@ -299,6 +299,54 @@ test('where the template is too coarse for a shape, its triangles are named, the
   }
 });
 
+test('where a repair has split a vertex, the bound is that of the file, which has it whole', async (t) => {
+  const d = await daemon(t);
+  // A ball whose poles are pulled to its centre, where they are one vertex.
+  const ball = shapes.ball(3);
+  const extreme = (sign) => ball.positions.reduce((s, p, i) => (sign * p[1] > sign * ball.positions[s][1] ? i : s), 0);
+  const [top, bottom] = [extreme(1), extreme(-1)];
+  const positions = ball.positions.map(([x, y, z], i) =>
+    i === top || i === bottom ? [0, 0, 0] : [x, y * Math.min(1, 0.02 + 1.4 * Math.hypot(x, z)), z],
+  );
+  const touching = { positions, triangles: ball.triangles.map((f) => f.map((v) => (v === bottom ? top : v))) };
+  const plain = shapes.ball(3);
+  const first = (await d.upload(shapes.obj(touching))).json;
+  assert.ok(
+    first.repairs.some(({ kind }) => kind === 'split-vertices'),
+    JSON.stringify(first.repairs),
+  );
+  const second = (await d.upload(shapes.obj(plain))).json;
+  const made = await d.made('/v1/supermeshes', {
+    shapes: [{ mesh: first.id }, { mesh: second.id }],
+    align: { method: 'rotate' },
+    remesh: { method: 'template', tolerance: 0.01 },
+    asset: { fit: 'none' },
+  });
+  const { hausdorff_relative, hausdorff_proved, diagonal, coarse } = made.shapes[1];
+  const morph = morphOf((await d.get(made.asset)).bytes);
+  assert.equal(morph.count, positions.length);
+  const points = pointsOf(morph, 1);
+  const samples = touching.triangles.flatMap((f) =>
+    [
+      [1, 0, 0],
+      [0.5, 0.5, 0],
+      [0, 0.5, 0.5],
+      [0.5, 0, 0.5],
+      [1 / 3, 1 / 3, 1 / 3],
+    ].map((w) => [0, 1, 2].map((k) => f.reduce((sum, v, i) => sum + w[i] * points[v][k], 0))),
+  );
+  const measured = farthest(samples, plain.positions.flat(), plain.triangles.flat()) / diagonal;
+  assert.ok(measured > 0.1, `the asset reaches from pole to pole: ${measured}`);
+  assert.equal(hausdorff_proved, true);
+  assert.ok(measured <= hausdorff_relative, `${measured}, stated ${hausdorff_relative}`);
+  // The triangles at the other pole are named.
+  const stretched = touching.triangles.flatMap((f, i) => (f.includes(top) ? [i] : []));
+  assert.ok(
+    coarse.triangles.some((i) => stretched.includes(i)),
+    `${coarse.triangles}, stretched ${stretched}`,
+  );
+});
+
 test('landmarks that turn a triangle over are named', async (t) => {
   const d = await daemon(t);
   const [base, target] = [shapes.egg(3), shapes.bean(3)];

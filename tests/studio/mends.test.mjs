@@ -191,9 +191,9 @@ test('two open shapes are mended, and morph from rim to rim', async () => {
     buffer: Buffer.from(obj(mesh)),
   }));
   await page.locator('input[type=file]').first().setInputFiles(files);
-  await page.getByText('Mend or replace the refused shapes first.').waitFor();
+  await page.getByText('Repair or replace the refused shapes first.').waitFor();
   await button(page, 'Fill the holes').first().click();
-  await page.getByText('Mend or replace the refused shape first.').waitFor();
+  await page.getByText('Repair or replace the refused shape first.').waitFor();
   await button(page, 'Fill the holes').click();
   await button(page, /^Morph 2 shapes$/).click();
   await defaultShown(page);

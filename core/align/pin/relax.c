@@ -61,7 +61,7 @@ end:
 
 orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
                         int64_t *work) {
-  for (int round = 0; round<ROUNDS && * work> 0; round++) {
+  for (int round = 0; *work > 0 && round < ROUNDS; round++) {
     int32_t removed, more;
     ORB_TRY(orb_sheet_thin(ctx, sheet, &removed));
     more = sheet->shape.mesh.vertex_count - sheet->given_vertices;

@@ -144,7 +144,7 @@ orb_status orb_untangle(orb_context *ctx, orb_sheet *sheet, const unsigned char 
   *left = count_flipped(sheet);
   for (int rings = 0; *left > 0 && rings < RINGS; rings++) {
     int32_t count = gather(sheet, held, rings, near, list);
-    for (int round = 0, moved = 1; moved && round<ROUNDS && * left> 0; round++) {
+    for (int round = 0, moved = 1; *left > 0 && moved && round < ROUNDS; round++) {
       moved = 0;
       for (int32_t i = 0; i < count; i++) {
         moved |= improve(sheet, list[i]);

@@ -100,7 +100,7 @@ function Progress({ running }: { running: Running }) {
 function missing(ready: number) {
   const refused = state.shapes.filter((shape) => shape.state === 'refused').length;
   if (refused && ready + refused >= 2)
-    return refused === 1 ? 'Mend or replace the refused shape first.' : 'Mend or replace the refused shapes first.';
+    return refused === 1 ? 'Repair or replace the refused shape first.' : 'Repair or replace the refused shapes first.';
   return ready === 1 ? 'Add one more shape.' : 'Add two shapes.';
 }
 

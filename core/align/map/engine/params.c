@@ -171,7 +171,7 @@ static const orb_map_params DEFAULTS = {
              .paid_more = 2,
              .paid_less = 0.7,
              .worst = 5,
-             .turn_cost = 0.1,
+             .rotation_cost = 0.1,
              .retry_times = 2,
              .retry_more = 1}};
 

@@ -359,14 +359,14 @@ typedef struct orb_map_params {
     double stiffness[3]; /* of the springs: the next is tried where the last leaves rims too far apart to be pinned */
     double met_share;    /* springs have brought rims together where this share of the points */
     double met;          /* is this near to a rim, of the diagonal */
-    double paid_times;  /* most that is paid for rims that are pinned, as energy above 1: this multiple of what there */
-    double paid_more;   /* was, and this much more. What fills the holes counts too, and hardly matters */
-    double paid_less;   /* the same where only springs hold them */
-    double worst;       /* energy of a map that is caught: whether rims meet under it says nothing */
-    double turn_cost;   /* of half a turn in space, squared, against the squared distance of two rims in their mean
-                           radius: files usually have shapes upright, and circles fit under any turn */
-    double retry_times; /* a map from another start, which brings rims together where the search has not, may have */
-    double retry_more;  /* this multiple of the energy above 1, and this much more */
+    double paid_times; /* most that is paid for rims that are pinned, as energy above 1: this multiple of what there */
+    double paid_more;  /* was, and this much more. What fills the holes counts too, and hardly matters */
+    double paid_less;  /* the same where only springs hold them */
+    double worst;      /* energy of a map that is caught: whether rims meet under it says nothing */
+    double rotation_cost; /* of a rotation by 180° in space, against the squared distance of two rims in their mean
+                         radius: files usually have shapes upright, and circles fit under any rotation */
+    double retry_times;   /* a map from another start, which brings rims together where the search has not, may have */
+    double retry_more;    /* this multiple of the energy above 1, and this much more */
   } rims;
 } orb_map_params;
 

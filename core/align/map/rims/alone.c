@@ -41,24 +41,24 @@ static void sample(const orb_mesh *mesh, const orb_hole_list *holes, const orb_h
   }
 }
 
-/* How badly the rims fit if sample i of the first one goes to sample i + turn of the second one. */
-static double cost_of(double turn_cost, const rim rims[2], int turn) {
+/* How badly the rims fit if sample i of the first one goes to sample i + shift of the second one. */
+static double cost_of(double rotation_cost, const rim rims[2], int shift) {
   double h[9] = {0}, r[9], sum = 0;
   for (int i = 0; i < SAMPLES; i++) {
-    orb_add_outer(h, rims[0].at[i], rims[1].at[(i + turn) % SAMPLES], 1);
+    orb_add_outer(h, rims[0].at[i], rims[1].at[(i + shift) % SAMPLES], 1);
   }
   if (!orb_nearest_rotation(h, r)) {
     return INFINITY;
   }
   for (int i = 0; i < SAMPLES; i++) {
-    const double *p = rims[1].at[(i + turn) % SAMPLES], *q = rims[0].at[i];
+    const double *p = rims[1].at[(i + shift) % SAMPLES], *q = rims[0].at[i];
     for (int c = 0; c < 3; c++) {
       const double off = r[3 * c] * p[0] + r[3 * c + 1] * p[1] + r[3 * c + 2] * p[2] - q[c];
       sum += off * off / SAMPLES;
     }
   }
   const double angle = acos(fmin(fmax(0.5 * (r[0] + r[4] + r[8] - 1), -1), 1)) / M_PI;
-  return sum + turn_cost * angle * angle;
+  return sum + rotation_cost * angle * angle;
 }
 
 /* The only hole of a list; NULL: there is none, or there are several. */
@@ -82,9 +82,9 @@ orb_status orb_rims_alone(orb_context *ctx, const orb_map_params *params, const 
   for (int s = 0; s < 2; s++) {
     sample(shapes[s].mesh, &holes[s], only(&holes[s]), &rims[s]);
   }
-  for (int turn = 0; turn < SAMPLES; turn++) {
-    const double cost = cost_of(params->rims.turn_cost, rims, turn);
-    best = cost < least ? turn : best;
+  for (int shift = 0; shift < SAMPLES; shift++) {
+    const double cost = cost_of(params->rims.rotation_cost, rims, shift);
+    best = cost < least ? shift : best;
     least = fmin(least, cost);
   }
   for (int i = 0; i < ORB_RIMS_ALONE; i++) {

@@ -16,9 +16,9 @@ enum {
   MOST_ROUNDS = 8192 /* after which the difference is constant */
 };
 
-/* Where the first rim goes on the second, as shares of their lengths: s ↦ s + turn + bend. */
+/* Where the first rim goes on the second, as shares of their lengths: s ↦ s + shift + offset. */
 typedef struct course {
-  double turn, bend[SAMPLES];
+  double shift, offset[SAMPLES];
 } course;
 
 /* To −0.5 … 0.5. */
@@ -40,7 +40,7 @@ static double advance(const course *c, double s) {
   const double x = s * SAMPLES;
   const int i = (int)fmin(floor(x), SAMPLES - 1);
   const double t = x - i;
-  return s + c->turn + (1 - t) * c->bend[i] + t * c->bend[(i + 1) % SAMPLES];
+  return s + c->shift + (1 - t) * c->offset[i] + t * c->offset[(i + 1) % SAMPLES];
 }
 
 /* Where the first rim has come to where the second one has come to v: the inverse. 0 ≤ s < 1. */
@@ -62,7 +62,7 @@ static double retreat(const course *c, double v) {
 static int keeps_order(const orb_map_params *params, const course *c) {
   const double step = 1.0 / SAMPLES;
   for (int i = 0; i < SAMPLES; i++) {
-    const double way = step + c->bend[(i + 1) % SAMPLES] - c->bend[i];
+    const double way = step + c->offset[(i + 1) % SAMPLES] - c->offset[i];
     if (way < params->rims.slowest * step || way > params->rims.fastest * step) {
       return 0;
     }
@@ -71,10 +71,10 @@ static int keeps_order(const orb_map_params *params, const course *c) {
 }
 
 static void smooth(course *c) {
-  double last = c->bend[SAMPLES - 1], first = c->bend[0];
+  double last = c->offset[SAMPLES - 1], first = c->offset[0];
   for (int i = 0; i < SAMPLES; i++) {
-    const double here = c->bend[i], next = i + 1 < SAMPLES ? c->bend[i + 1] : first;
-    c->bend[i] = 0.25 * last + 0.5 * here + 0.25 * next;
+    const double here = c->offset[i], next = i + 1 < SAMPLES ? c->offset[i + 1] : first;
+    c->offset[i] = 0.25 * last + 0.5 * here + 0.25 * next;
     last = here;
   }
 }
@@ -102,13 +102,13 @@ static void follow_map(const orb_map_params *params, const orb_rim_side sides[2]
     double p[3], distance;
     const double s = (double)i / SAMPLES;
     image_at(&sides[0], first, s, &edge, p);
-    out->bend[i] = orb_rim_nearest(&sides[1], second, p, &distance) - s;
-    sum[0] += cos(2 * M_PI * out->bend[i]);
-    sum[1] += sin(2 * M_PI * out->bend[i]);
+    out->offset[i] = orb_rim_nearest(&sides[1], second, p, &distance) - s;
+    sum[0] += cos(2 * M_PI * out->offset[i]);
+    sum[1] += sin(2 * M_PI * out->offset[i]);
   }
-  out->turn = atan2(sum[1], sum[0]) / (2 * M_PI);
+  out->shift = atan2(sum[1], sum[0]) / (2 * M_PI);
   for (int i = 0; i < SAMPLES; i++) {
-    out->bend[i] = wrapped(out->bend[i] - out->turn);
+    out->offset[i] = wrapped(out->offset[i] - out->shift);
   }
   for (int round = 0; round < LEAST_ROUNDS || (round < MOST_ROUNDS && !keeps_order(params, out)); round++) {
     smooth(out);

@@ -10,8 +10,8 @@ typedef struct orb_rim_points {
   orb_place *at; /* 2 each */
 } orb_rim_points;
 
-/* Pairs the points of two rims by arc length, with the rotation that the map says, and bent towards where it takes them
- * as far as no stretch of a rim gets much longer or shorter (params->rims.slowest, fastest). Each vertex of either rim
+/* Pairs the points of two rims by arc length, shifted by what the map says. The pairing then follows the map, unless a
+ * part of a rim would get much longer or shorter (params->rims.slowest, fastest). Each vertex of either rim
  * is a point: where two are nearly at one place, they are one. Appends them to *points. most: points; beyond that, only
  * some vertices of the first rim. */
 ORB_MUST_CHECK orb_status orb_rims_along(orb_context *ctx, const orb_map_params *params, const orb_rim_side sides[2],

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
 
 /* Holes of a shape that are considered, the longest first: it bounds the time for a shape of cracks. */
@@ -14,15 +15,18 @@ static double length_of(const orb_rim_side *side, int32_t hole) {
 }
 
 /* The mean distance from where the map takes a rim to a rim there. */
-static double distance_from(const orb_rim_side *from, int32_t rim, const orb_rim_side *to, int32_t other) {
+static orb_status distance_from(orb_context *ctx, const orb_rim_side *from, int32_t rim, const orb_rim_side *to,
+                                int32_t other, double *mean) {
   const orb_hole *hole = &from->holes.of[rim];
   double sum = 0;
   for (int32_t k = 0; k < hole->count; k++) {
     double distance;
+    ORB_TRY(orb_context_check(ctx));
     (void)orb_rim_nearest(to, &to->holes.of[other], from->image + 3 * (size_t)(hole->start + k), &distance);
     sum += distance;
   }
-  return sum / hole->count / to->diagonal;
+  *mean = sum / hole->count / to->diagonal;
+  return ORB_OK;
 }
 
 /* The longest holes whose rims are simple, longest first. Returns how many. */
@@ -45,15 +49,21 @@ static int32_t longest(const orb_rim_side *side, int32_t out[MOST]) {
   return count;
 }
 
-/* INFINITY: the two holes do not correspond. */
-static double cost_of(const orb_map_params *params, const orb_rim_side sides[2], int32_t a, int32_t b, int alone) {
+/* *cost INFINITY: the two holes do not correspond. O(product of the edges of both). */
+static orb_status find_cost(orb_context *ctx, const orb_map_params *params, const orb_rim_side sides[2], int32_t a,
+                            int32_t b, int alone, double *cost) {
   const double lengths[2] = {length_of(&sides[0], a), length_of(&sides[1], b)};
   const double longer = fmax(lengths[0], lengths[1]) / fmin(lengths[0], lengths[1]);
   if (!(longer <= (alone ? params->rims.longer_alone : params->rims.longer))) {
-    return INFINITY;
+    *cost = INFINITY;
+    return ORB_OK;
   }
-  const double apart = 0.5 * (distance_from(&sides[0], a, &sides[1], b) + distance_from(&sides[1], b, &sides[0], a));
-  return alone || apart <= params->rims.apart * 0.5 * (lengths[0] + lengths[1]) ? apart : INFINITY;
+  double forth, back;
+  ORB_TRY(distance_from(ctx, &sides[0], a, &sides[1], b, &forth));
+  ORB_TRY(distance_from(ctx, &sides[1], b, &sides[0], a, &back));
+  const double apart = 0.5 * (forth + back);
+  *cost = alone || apart <= params->rims.apart * 0.5 * (lengths[0] + lengths[1]) ? apart : INFINITY;
+  return ORB_OK;
 }
 
 orb_status orb_rims_pair(orb_context *ctx, const orb_map_params *params, const orb_rim_side sides[2],
@@ -68,7 +78,7 @@ orb_status orb_rims_pair(orb_context *ctx, const orb_map_params *params, const o
   }
   for (int32_t a = 0; a < holes[0]; a++) {
     for (int32_t b = 0; b < holes[1]; b++) {
-      cost[a][b] = cost_of(params, sides, hole[0][a], hole[1][b], alone);
+      ORB_TRY(find_cost(ctx, params, sides, hole[0][a], hole[1][b], alone, &cost[a][b]));
     }
   }
   for (;;) {

@@ -10,14 +10,15 @@
 #include "align/sheet/landmarks.h"
 #include "align/sheet/sheet.h"
 #include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-/* Points of the rims of a shape. Beyond that, they are so near that some of them hold the others; of a large shape,
- * whose copy keeps them and what is around them, fewer are. */
+/* Most points of the rims of a shape. More lie so close together that some hold the others. The copy of a large shape
+ * keeps its points and their neighbours, so it gets fewer. A rim gets at least as many as show its form. */
 enum { MOST_POINTS = 1200, MOST_POINTS_OF_LARGE = 256, LEAST_POINTS_A_RIM = 16 };
 
-/* Points that one vertex may be beside. */
+/* Points that one vertex may be beside: one more than those of an edge of the rim. */
 enum { MOST_BESIDE = 3 };
 
 /* The base and a later shape, with points of their rims as vertices beside the landmarks of the alignment. */
@@ -289,6 +290,7 @@ static orb_status have_met(const rim_job *job, const orb_rim_side *first, int *m
   const orb_mesh *mesh = &job->fixed.mesh;
   orb_locator *locator = NULL;
   int32_t near = 0;
+  orb_status status = ORB_OK;
   ORB_TRY(orb_locator_create(job->ctx, job->fixed.points, mesh->vertex_count, mesh->triangles, mesh->triangle_count,
                              NULL, &locator));
   for (int32_t l = 0; l < job->count; l++) {
@@ -297,6 +299,7 @@ static orb_status have_met(const rim_job *job, const orb_rim_side *first, int *m
     orb_locate(locator, job->moving.points + 3 * (size_t)job->second[l], -1, &place);
     orb_place_position(mesh, &place, p);
     double least = INFINITY;
+    ORB_GO(status, orb_context_check(job->ctx), done);
     for (int32_t i = 0; i < first->holes.count && least > job->params->rims.met * first->diagonal; i++) {
       double distance;
       (void)orb_rim_nearest(first, &first->holes.of[i], p, &distance);
@@ -305,8 +308,9 @@ static orb_status have_met(const rim_job *job, const orb_rim_side *first, int *m
     near += least <= job->params->rims.met * first->diagonal;
   }
   *met = near >= job->params->rims.met_share * job->count;
+done:
   orb_locator_destroy(job->ctx, locator);
-  return ORB_OK;
+  return status;
 }
 
 /* Lets the whole shape follow its copy. */

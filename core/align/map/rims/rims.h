@@ -4,7 +4,7 @@
  * lies there. If a later shape has the same hole, the two rims must meet. Otherwise the asset loses a strip of that
  * shape's surface, or shows a strip of what fills its hole.
  *
- * Comes in: an alignment. Goes out: the same, in which the rims of holes that correspond lie on each other. Read in
+ * In: an alignment. Out: the same, in which the rims of holes that correspond lie on each other. Read in
  * this order:
  *
  *   side.h   one of the two shapes, its holes, and where the map takes their rims

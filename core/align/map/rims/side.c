@@ -7,12 +7,13 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-int32_t orb_rim_vertex(const orb_rim_side *side, int32_t i) {
+/* The vertex at which half-edge i of the rims begins. */
+static int32_t rim_vertex(const orb_rim_side *side, int32_t i) {
   return side->shape->mesh.triangles[side->holes.half_edges[i]];
 }
 
 static const double *point_of(const orb_rim_side *side, int32_t i) {
-  return side->shape->mesh.positions + 3 * (size_t)orb_rim_vertex(side, i);
+  return side->shape->mesh.positions + 3 * (size_t)rim_vertex(side, i);
 }
 
 double orb_rim_nearest(const orb_rim_side *side, const orb_hole *hole, const double p[3], double *distance) {
@@ -62,7 +63,7 @@ static orb_status take_over(orb_context *ctx, orb_rim_side *from, const orb_rim_
   }
   for (int32_t i = 0; i < count; i++) {
     orb_place place;
-    orb_locate(to->locator, from->shape->points + 3 * (size_t)orb_rim_vertex(from, i), hint, &place);
+    orb_locate(to->locator, from->shape->points + 3 * (size_t)rim_vertex(from, i), hint, &place);
     orb_place_position(&to->shape->mesh, &place, from->image + 3 * (size_t)i);
     hint = place.triangle;
   }

@@ -19,9 +19,6 @@ ORB_MUST_CHECK orb_status orb_rim_sides_create(orb_context *ctx, const orb_align
                                                const orb_aligned_shape *second, orb_rim_side sides[2]);
 void orb_rim_sides_free(orb_context *ctx, orb_rim_side sides[2]);
 
-/* The vertex at which half-edge i of the rims begins. */
-int32_t orb_rim_vertex(const orb_rim_side *side, int32_t i);
-
 /* The point of a rim that is nearest to p: as a share of the rim's length from its first vertex. *distance: from p.
  * O(edges). */
 double orb_rim_nearest(const orb_rim_side *side, const orb_hole *hole, const double p[3], double *distance);
