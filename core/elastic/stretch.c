@@ -14,11 +14,11 @@ enum {
   GRAIN = 128,      /* vertices of one task */
   ROUND_EACH = 600, /* vertices of a mesh for each round of smoothing, which then reaches as far from 2,400 to 24,000
                        vertices. Four times as much is as good */
-  ROUNDS_LEAST = 4,
-  ROUNDS_MOST = 40
+  ROUNDS_LEAST = 4, /* fewer leave the noise of single triangles */
+  ROUNDS_MOST = 40  /* a bound on the time of large meshes; a slide's first mesh hardly has more than 24,000 vertices */
 };
 /* Weight of the mean stretch against the moments. With less, noise stretches thin limbs; with more, girths cannot
- * change. */
+ * change: with 0.2, two people stay a hundredth farther from the truth. */
 static const double MEAN_SHARE = 0.1;
 
 typedef struct fitting {

@@ -115,9 +115,9 @@ function joinedIndex(parts: Drawn[]): Uint32Array {
   let at = 0;
   let base = 0;
   for (const part of parts) {
-    const turned = determinant(part.matrix) < 0;
+    const reversed = determinant(part.matrix) < 0;
     for (let i = 0; i < part.index.length; i++) {
-      const from = turned && i % 3 > 0 ? i + (i % 3 === 1 ? 1 : -1) : i;
+      const from = reversed && i % 3 > 0 ? i + (i % 3 === 1 ? 1 : -1) : i;
       index[at++] = part.index[from] + base;
     }
     base += part.position.length / 3;

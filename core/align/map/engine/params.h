@@ -347,7 +347,8 @@ typedef struct orb_map_params {
     double kept_gain;    /* of the area halfway: less does not show in a morph */
   } untwist;
 
-  /* Rims of filled holes that correspond (rims/). */
+  /* Rims of filled holes that correspond (rims/). Chosen on the pairs of open shapes of tests/scenario/holes.test.mjs.
+   */
   struct {
     double longer;       /* rims that correspond differ in length by this factor at most, relative to the diagonals; */
     double longer_alone; /* the same for shapes of one hole each */

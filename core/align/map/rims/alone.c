@@ -7,7 +7,7 @@
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
-enum { SAMPLES = 96 }; /* of a rim: a multiple of ORB_RIMS_ALONE */
+enum { SAMPLES = 96 }; /* of a rim: a multiple of ORB_RIMS_ALONE, and 4° apart on a circle */
 
 typedef struct rim {
   orb_place place[SAMPLES];
