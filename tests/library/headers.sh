@@ -4,14 +4,14 @@
 #   headers.sh INCLUDE C-COMPILER C++-COMPILER
 set -eu
 include=$1 cc=$2 cxx=$3
-flags="-Wall -Wextra -Wpedantic -Werror -fsyntax-only -I $include"
+flags="-Wall -Wextra -Wpedantic -Werror -fsyntax-only"
 count=0
 for header in "$include"/orbmorph/*.h; do
   name=orbmorph/$(basename "$header")
   # shellcheck disable=SC2086 # flags are words
-  printf '#include "%s"\ntypedef int not_empty;\n' "$name" | "$cc" -std=c17 -Wstrict-prototypes $flags -x c - || { echo "$name as C17" >&2; exit 1; }
+  printf '#include "%s"\ntypedef int not_empty;\n' "$name" | "$cc" -std=c17 -Wstrict-prototypes $flags -I "$include" -x c - || { echo "$name as C17" >&2; exit 1; }
   # shellcheck disable=SC2086
-  printf '#include "%s"\ntypedef int not_empty;\n' "$name" | "$cxx" -std=c++17 $flags -x c++ - || { echo "$name as C++17" >&2; exit 1; }
+  printf '#include "%s"\ntypedef int not_empty;\n' "$name" | "$cxx" -std=c++17 $flags -I "$include" -x c++ - || { echo "$name as C++17" >&2; exit 1; }
   if [ "$name" != orbmorph/orbmorph.h ]; then
     if grep -nE '^(ORB_MUST_CHECK|const|unsigned|void|[a-z]+|[a-z0-9]+_t|orb_[a-z_]+) [a-z_ *0-9]*orb_[a-z_0-9]+\(' "$header" |
       grep -v ':static '; then

@@ -39,9 +39,9 @@ if dpkg-query -L $packages >"$scratch/required/files" 2>/dev/null; then
 fi
 
 # Shared, C17.
-# shellcheck disable=SC2046 # words
-"$CC" -std=c17 -Wall -Wextra -Wpedantic -Werror "$tree/docs/library/morph.c" $(pkg-config --cflags --libs orbmorph) \
-  -o "$scratch/morph-shared"
+flags=$(pkg-config --cflags --libs orbmorph)
+eval "set -- $flags" # pkg-config escapes blanks in the names of folders
+"$CC" -std=c17 -Wall -Wextra -Wpedantic -Werror "$tree/docs/library/morph.c" "$@" -o "$scratch/morph-shared"
 export LD_LIBRARY_PATH="$prefix/$LIBDIR"
 ldd "$scratch/morph-shared" | grep -q "liborbmorph.so.1 => $prefix/" || fail "morph-shared does not load liborbmorph.so.1"
 
@@ -50,8 +50,9 @@ mkdir "$scratch/static"
 cp -R "$prefix/." "$scratch/static/"
 rm "$scratch/static/$LIBDIR"/liborbmorph.so*
 PKG_CONFIG_PATH="$scratch/static/$LIBDIR/pkgconfig"
-# shellcheck disable=SC2046
-"$CC" -std=c17 "$tree/docs/library/morph.c" $(pkg-config --static --cflags --libs orbmorph) -o "$scratch/morph-static"
+flags=$(pkg-config --static --cflags --libs orbmorph)
+eval "set -- $flags"
+"$CC" -std=c17 "$tree/docs/library/morph.c" "$@" -o "$scratch/morph-static"
 
 # Static, C++17.
 "$CMAKE" -S "$here/consumer" -B "$scratch/consumer" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_COMPILER="$CXX" \
