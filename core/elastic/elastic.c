@@ -49,7 +49,8 @@ static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
 /* A slide follows the relief as far as the last reach lets it: with 0.06 people stay a twentieth farther from the
  * truth. First ones of 0.2 to 0.6 are as good. */
 static const double SLIDE_FIRST_REACH = 0.3, SLIDE_LAST_REACH = 0.12;
-static const double AHEAD = 0.9; /* of the way of the last round: how far ahead a slide looks */
+static const double AHEAD =
+    0.9; /* of the way of the last round: how far ahead a slide looks. 0.7 comes a fiftieth less far */
 /* The rough map keeps pulling beside the places, with this share of its strength at first, and not at all after FADED
  * of the rounds: without it a limb slides to the nearest other one. */
 static const double MAP_SHARE = 0.3, FADED = 0.7;

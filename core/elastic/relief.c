@@ -19,12 +19,13 @@ enum {
 };
 /* The residual at which they end, relative to the first one. With 0.001, people come no nearer to the truth. */
 static const double SETTLED = 1e-2;
-/* Chosen, as all below, on the 20 pairs of people of the half `choose` of tests/bench/correspond.py, with 8 landmarks.
- */
+/* The constants below were chosen with 8 landmarks, on the 20 pairs of people of the half `choose` of
+ * tests/bench/correspond.py, unless they say otherwise. */
+
 /* The smallest surroundings, in radii of a ball of the shape's area; the next ones are twice as large. With 0.03 people
  * come as near to the truth, and with 0.1 they stay a third farther away in another pose. */
 static const double SMALLEST = 0.05;
-/* The least smallest surroundings, in mean edges. */
+/* The least smallest surroundings, in mean edges: smaller ones hold no vertex but the own one. Not varied. */
 static const double EDGES = 1.1;
 /* Damping of a step, in squared heights per squared radius: where the relief slopes less than its root, a step says
  * little. 5 and 60 are about as good. */
@@ -298,7 +299,7 @@ orb_status orb_relief_create(orb_context *ctx, const orb_body *body, double grai
   const size_t n = (size_t)body->count;
   double *place = ORB_NEW(ctx, double, 3 * n), *normal = ORB_NEW(ctx, double, 3 * n), *area = ORB_NEW0(ctx, double, n);
   heat h = {0};
-  out->height = ORB_NEW(ctx, double, n *ORB_RELIEF_SIZES);
+  out->height = ORB_NEW(ctx, double, (size_t)ORB_RELIEF_SIZES *n);
   out->slope = wants_slope ? ORB_NEW(ctx, double, 3 * ORB_RELIEF_SIZES * n) : NULL;
   orb_status status = heat_create(ctx, body, &h);
   if (!place || !normal || !area || !out->height || (wants_slope && !out->slope)) {
@@ -318,21 +319,9 @@ orb_status orb_relief_create(orb_context *ctx, const orb_body *body, double grai
   return status;
 }
 
-/* Solves the symmetric system m x = right, which damping keeps positive definite. */
-static void solve(const double m[9], const double right[3], double x[3]) {
-  double c0[3], c1[3], c2[3];
-  orb_cross(m + 3, m + 6, c0);
-  orb_cross(m + 6, m, c1);
-  orb_cross(m, m + 3, c2);
-  const double det = orb_dot(m, c0);
-  for (int k = 0; k < 3; k++) {
-    x[k] = (c0[k] * right[0] + c1[k] * right[1] + c2[k] * right[2]) / det;
-  }
-}
-
 void orb_relief_step(const double *height, const orb_relief *b, int32_t u, const double from[3], const double normal[3],
                      double step[3]) {
-  double normal_matrix[9] = {DAMPING, 0, 0, 0, DAMPING, 0, 0, 0, DAMPING}, right[3] = {0};
+  double normal_matrix[9] = {DAMPING, 0, 0, 0, DAMPING, 0, 0, 0, DAMPING}, right[3] = {0}, cofactors[9];
   for (size_t s = 0; s < ORB_RELIEF_SIZES; s++) {
     const size_t at = ORB_RELIEF_SIZES * (size_t)u + s;
     const double *slope = b->slope + 3 * at;
@@ -343,7 +332,10 @@ void orb_relief_step(const double *height, const orb_relief *b, int32_t u, const
       right[k] += slope[k] * counted;
     }
   }
-  solve(normal_matrix, right, step);
+  const double det = orb_cofactors(normal_matrix, cofactors); /* above 0, by the damping */
+  for (int k = 0; k < 3; k++) {
+    step[k] = orb_dot(cofactors + 3 * k, right) / det;
+  }
   const double length = orb_length(step), share = TAKEN * (length > STEP_MOST ? STEP_MOST / length : 1),
                off = orb_dot(step, normal);
   for (int k = 0; k < 3; k++) {

@@ -84,19 +84,13 @@ static void smooth_range(void *arg, int64_t begin, int64_t end, int thread) {
 
 /* Row-major a b⁻¹ of a symmetric b. Returns 0 where b has no inverse. */
 static int divide(const double a[9], const double b[9], double out[9]) {
-  double c0[3], c1[3], c2[3];
-  orb_cross(b + 3, b + 6, c0);
-  orb_cross(b + 6, b, c1);
-  orb_cross(b, b + 3, c2);
-  const double det = orb_dot(b, c0);
+  double c[9];
+  const double det = orb_cofactors(b, c);
   if (!(det > 0)) {
     return 0;
   }
-  for (int i = 0; i < 3; i++) {
-    const double *row = a + 3 * i;
-    out[3 * i] = orb_dot(row, c0) / det;
-    out[3 * i + 1] = orb_dot(row, c1) / det;
-    out[3 * i + 2] = orb_dot(row, c2) / det;
+  for (int i = 0; i < 9; i++) {
+    out[i] = orb_dot(a + i / 3 * 3, c + i % 3 * 3) / det;
   }
   return 1;
 }

@@ -43,6 +43,18 @@ static int32_t root_of(int32_t *parent, int32_t v) {
   return v;
 }
 
+/* Has a repair split a vertex, or covered what it opened? */
+static int has_torn(const orb_mesh *repaired) {
+  int has = 0;
+  for (int32_t v = 0; v < repaired->vertex_count && !has; v++) {
+    has = first_copy(repaired, v) != v;
+  }
+  for (int32_t t = 0; t < repaired->triangle_count && !has; t++) {
+    has = repaired->source_triangle[t] == ORB_MADE_COVER;
+  }
+  return has;
+}
+
 /* Joins the vertices of each cover. covered: of each vertex, whether it is of one. */
 static void join_covers(const orb_mesh *repaired, const orb_supermesh *supermesh, int32_t *parent,
                         unsigned char *covered) {
@@ -85,6 +97,9 @@ static double widest(const double *positions, int32_t count, int32_t *parent, co
 }
 
 orb_status orb_report_torn(orb_context *ctx, const orb_mesh *repaired, orb_merge_result *out) {
+  if (!has_torn(repaired)) {
+    return ORB_OK;
+  }
   const orb_supermesh *supermesh = &out->supermesh;
   const size_t n = (size_t)supermesh->vertex_count;
   double *positions = ORB_NEW(ctx, double, 3 * n), *box = ORB_NEW(ctx, double, 6 * n);

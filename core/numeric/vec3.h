@@ -72,6 +72,15 @@ static inline void orb_add_outer(double h[9], const double y[3], const double x[
   }
 }
 
+/* The cofactors of a row-major matrix, row by row. Returns its determinant. Divided by that, they are its inverse,
+ * transposed. */
+static inline double orb_cofactors(const double m[9], double c[9]) {
+  orb_cross(m + 3, m + 6, c);
+  orb_cross(m + 6, m, c + 3);
+  orb_cross(m, m + 3, c + 6);
+  return orb_dot(m, c);
+}
+
 /* det(a, b, c), computed from differences to a, so that close points lose no digits. */
 static inline double orb_det(const double a[3], const double b[3], const double c[3]) {
   double n[3];

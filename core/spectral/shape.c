@@ -223,7 +223,7 @@ orb_status orb_spectral_shape_create(orb_context *ctx, const orb_mesh *mesh, int
   w.mass = ORB_NEW0(ctx, double, n);
   w.normal = ORB_NEW0(ctx, double, 3 * n);
   w.entries = ORB_NEW(ctx, orb_entry, 12 * (size_t)mesh->triangle_count);
-  out->function = ORB_NEW(ctx, double, n *ORB_SPECTRAL_FUNCTIONS);
+  out->function = ORB_NEW(ctx, double, (size_t)ORB_SPECTRAL_FUNCTIONS *n);
   out->distance = ORB_NEW(ctx, float, (size_t)ORB_SPECTRAL_SAMPLES *ORB_SPECTRAL_SAMPLES);
   out->height = ORB_NEW(ctx, float, (size_t)ORB_SPECTRAL_SAMPLES *ORB_SPECTRAL_SAMPLES);
   orb_status status = ORB_E_NO_MEMORY;

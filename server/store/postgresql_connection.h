@@ -18,7 +18,7 @@ typedef struct pgsql_connection {
   int generation; /* counts connections: statements are prepared again on each */
   int statements; /* counts them, for their names */
   int64_t changes, holder;
-  int broken;      /* of no use, whatever its socket says */
+  int broken;      /* unusable, whatever its socket says */
   int waits_on;    /* the generation that the wait for other nodes is prepared on */
   int sent, begun; /* statements in flight (postgresql_pipeline.h); whether BEGIN is one of them */
   struct {

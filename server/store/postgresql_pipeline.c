@@ -79,7 +79,7 @@ static PGresult *take(const pgsql_connection *c) {
   return result;
 }
 
-/* Takes what is left until the server has come to the end of the pipeline. If it does not, the connection is of no use.
+/* Takes what is left until the server has come to the end of the pipeline. If it does not, the connection is unusable.
  */
 static void leave(pgsql_connection *c) {
   enum { MOST = 2 * PGSQL_SENT };

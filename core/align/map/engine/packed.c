@@ -122,8 +122,8 @@ static int reserve(orb_context *ctx, orb_map_packed *p) {
   p->b.density = ORB_NEW(ctx, double, m);
   p->s = ORB_NEW(ctx, double, 3 * n);
   p->triangles = ORB_NEW(ctx, int32_t, 3 * m);
-  p->vertex_row = ORB_NEW0(ctx, double, n *ORB_MAP_ROW);
-  p->triangle_row = ORB_NEW0(ctx, double, m *ORB_MAP_ROW);
+  p->vertex_row = ORB_NEW0(ctx, double, (size_t)ORB_MAP_ROW *n);
+  p->triangle_row = ORB_NEW0(ctx, double, (size_t)ORB_MAP_ROW *m);
   p->rotation = ORB_NEW(ctx, double, 6 * m);
   p->to = ORB_NEW(ctx, int32_t, m);
   p->from = ORB_NEW(ctx, int32_t, m);

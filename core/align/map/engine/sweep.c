@@ -87,7 +87,7 @@ static void fill(sweep_run *s) {
 static orb_status reserve(orb_context *ctx, sweep_run *s) {
   orb_map_step_job *j = &s->job;
   size_t n = (size_t)j->level->count, m = 3 * (size_t)j->level->triangle_count;
-  j->row = ORB_NEW0(ctx, double, n *ORB_MAP_ROW); /* zeroed: whole vectors are read */
+  j->row = ORB_NEW0(ctx, double, (size_t)ORB_MAP_ROW *n); /* zeroed: whole vectors are read */
   j->at = ORB_NEW(ctx, double, 3 * n);
   j->triangle = ORB_NEW(ctx, int32_t, n);
   j->ring = ORB_NEW(ctx, int32_t, m);

@@ -78,13 +78,11 @@ static void spline_at(const spline *s, const double p[3], double y[3], double *j
 
 /* A normal under the Jacobian: by its cofactors. */
 static void map_normal(const double j[9], const double n[3], double out[3]) {
-  double c0[3], c1[3], c2[3];
-  orb_cross(j + 3, j + 6, c0);
-  orb_cross(j + 6, j, c1);
-  orb_cross(j, j + 3, c2);
-  out[0] = orb_dot(c0, n);
-  out[1] = orb_dot(c1, n);
-  out[2] = orb_dot(c2, n);
+  double c[9];
+  (void)orb_cofactors(j, c);
+  for (int k = 0; k < 3; k++) {
+    out[k] = orb_dot(c + 3 * k, n);
+  }
   orb_normalize(out);
 }
 
