@@ -27,6 +27,7 @@ struct Adder {
   Editor editor;
   std::set<size_t> meshes;   /* those on the surface */
   std::vector<Block> blocks; /* of these meshes */
+  std::vector<size_t> twin;  /* per block: the first block with the same accessor of positions */
 
   Adder(orb_context *context, const Document &document, Bytes first, const orb_additions &additions)
       : ctx(context), doc(document.root()), more(additions), editor(context, document.root(), first) {
@@ -45,6 +46,10 @@ struct Adder {
         blocks.push_back(block);
       }
     }
+    std::map<int64_t, size_t> seen;
+    for (size_t i = 0; i < blocks.size(); i++) {
+      twin.push_back(seen.emplace(whole(attributes_of(blocks[i]), "POSITION", NONE), i).first->second);
+    }
   }
 
   static cJSON *attributes_of(const Block &block) { return editable(member(block.primitive, "attributes")); }
@@ -56,16 +61,27 @@ struct Adder {
     return out;
   }
 
-  /* Sets of one primitive must be numbered from 0 without gaps: what it lacks below `number` gets white or zeros. */
-  void fill_below(const Block &block, const std::string &prefix, int32_t number, size_t width) {
-    int64_t same = NONE;
+  /* Whether block i shares its vertices with an earlier one, and has the same values: it gets the same accessor. */
+  template <typename T>
+  bool is_repeated(size_t i, const T *values, size_t width) const {
+    const T *own = values + width * static_cast<size_t>(blocks[i].first);
+    const T *other = values + width * static_cast<size_t>(blocks[twin[i]].first);
+    return twin[i] != i && std::memcmp(own, other, width * blocks[i].count * sizeof(T)) == 0;
+  }
+
+  /* Sets of one primitive must be numbered from 0 without gaps: what it lacks below `number` gets white or zeros.
+   * plain: an accessor of these, by its number of vertices. */
+  void fill_below(const Block &block, const std::string &prefix, int32_t number, size_t width,
+                  std::map<size_t, int64_t> *plain) {
     for (int32_t n = 0; n < number; n++) {
       std::string name = prefix + std::to_string(n);
       if (!member(attributes_of(block), name.c_str())) {
-        Floats plain{Charged<float>(ctx)};
-        plain.assign(width * block.count, width == 4 ? 1.0f : 0.0f);
-        same = same == NONE ? editor.add(plain, width, true, false) : same;
-        set(attributes_of(block), name.c_str(), static_cast<double>(same));
+        if (!plain->count(block.count)) {
+          Floats values{Charged<float>(ctx)};
+          values.assign(width * block.count, width == 4 ? 1.0f : 0.0f);
+          (*plain)[block.count] = editor.add(values, width, true, false);
+        }
+        set(attributes_of(block), name.c_str(), static_cast<double>((*plain)[block.count]));
       }
     }
   }
@@ -79,21 +95,32 @@ struct Adder {
         number++;
       }
     }
-    for (const Block &block : blocks) {
-      fill_below(block, prefix, number, width);
-      int64_t accessor = editor.add(floats_of(block, added->values, width), width, true, false);
-      set(attributes_of(block), (prefix + std::to_string(number)).c_str(), static_cast<double>(accessor));
+    std::map<size_t, int64_t> plain;
+    std::vector<int64_t> accessors;
+    for (size_t i = 0; i < blocks.size(); i++) {
+      fill_below(blocks[i], prefix, number, width, &plain);
+      accessors.push_back(is_repeated(i, added->values, width)
+                              ? accessors[twin[i]]
+                              : editor.add(floats_of(blocks[i], added->values, width), width, true, false));
+      set(attributes_of(blocks[i]), (prefix + std::to_string(number)).c_str(), static_cast<double>(accessors[i]));
     }
     added->number = number;
   }
 
-  void add_weights(const Block &block) {
+  void add_weights(size_t i) {
+    const Block &block = blocks[i];
+    if (is_repeated(i, more.skin.joints, 4) && is_repeated(i, more.skin.weights, 4)) {
+      for (const char *name : SKINNED) {
+        set(attributes_of(block), name, static_cast<double>(whole(attributes_of(blocks[twin[i]]), name, NONE)));
+      }
+      return;
+    }
     const size_t from = 4 * static_cast<size_t>(block.first), count = 4 * block.count;
     int64_t joints = NONE;
     if (more.skin.joint_count <= 256) {
       std::vector<unsigned char, Charged<unsigned char>> bytes{Charged<unsigned char>(ctx)};
-      for (size_t i = 0; i < count; i++) {
-        bytes.push_back(static_cast<unsigned char>(more.skin.joints[from + i]));
+      for (size_t k = 0; k < count; k++) {
+        bytes.push_back(static_cast<unsigned char>(more.skin.joints[from + k]));
       }
       joints = editor.add_list(bytes.data(), count, ORB_GLTF_UBYTE, block.count, "VEC4", true);
     } else {
@@ -138,8 +165,8 @@ struct Adder {
 
   void add_skin() {
     check_skin();
-    for (const Block &block : blocks) {
-      add_weights(block);
+    for (size_t i = 0; i < blocks.size(); i++) {
+      add_weights(i);
     }
     int64_t skin = copy_skin(ctx, doc, &editor, more.skin, blocks[0].matrix);
     for (const cJSON *node : array_of(doc, "nodes")) {

@@ -32,17 +32,21 @@ void decode_octahedron(const int16_t stored[4], int16_t shown[4]) {
 
 }  // namespace
 
-orb_status orb_codec_order(orb_context *ctx, uint32_t *indices, size_t index_count, size_t vertex_count,
-                           uint32_t *order) {
+orb_status orb_codec_order(orb_context *ctx, uint32_t *all, const size_t *counts, size_t part_count,
+                           size_t vertex_count, uint32_t *order) {
   void *charge = orb_alloc(ctx, vertex_count, BYTES_A_VERTEX);
   if (!charge) {
     return ORB_E_NO_MEMORY;
   }
   orb_status status = ORB_OK;
   try {
-    meshopt_optimizeVertexCacheStrip(indices, indices, index_count, vertex_count);
-    meshopt_optimizeVertexFetchRemap(order, indices, index_count, vertex_count);
-    meshopt_remapIndexBuffer(indices, indices, index_count, order);
+    size_t total = 0;
+    for (size_t p = 0; p < part_count; p++) {
+      meshopt_optimizeVertexCacheStrip(all + total, all + total, counts[p], vertex_count);
+      total += counts[p];
+    }
+    meshopt_optimizeVertexFetchRemap(order, all, total, vertex_count);
+    meshopt_remapIndexBuffer(all, all, total, order);
   } catch (const std::bad_alloc &) {
     status = orb_fail(ctx, ORB_E_NO_MEMORY, "There is not enough memory to order the triangles.");
   }

@@ -34,9 +34,10 @@ typedef struct maker {
   double error, degrees;
 } maker;
 
-/* A primitive while its streams are made. */
+/* The primitives that have the same vertices, while their streams are made. */
 typedef struct part {
-  const cJSON *attributes, *targets;
+  const cJSON *first, *attributes, *targets;
+  int32_t primitive_count;
   int32_t vertex_count, target_count, position, normal;
   uint32_t *order;  /* the new number of each vertex; NULL: as it is */
   float *positions; /* of the base, in the new order */
@@ -48,8 +49,9 @@ static int is_accessor(const maker *m, int32_t number, int32_t count) {
          !m->streams[number].bytes;
 }
 
-/* Reads the indices and reorders them and the vertices. */
-static orb_status order_part(maker *m, const cJSON *primitive, part *p) {
+/* Reads the indices of a primitive. out: NULL: only their number. */
+static orb_status read_indices(const maker *m, const cJSON *primitive, int32_t vertex_count, size_t *count,
+                               uint32_t *out) {
   int32_t number = orb_source_number(primitive, "indices");
   if (number < 0 || number >= m->source.accessor_count || m->streams[number].bytes) {
     return orb_source_corrupt(m->ctx);
@@ -59,25 +61,80 @@ static orb_status order_part(maker *m, const cJSON *primitive, part *p) {
   if ((!wide && from->component_type != ORB_GLTF_USHORT) || from->components != 1 || from->count % 3 != 0) {
     return orb_source_corrupt(m->ctx);
   }
-  uint32_t *indices = ORB_NEW(m->ctx, uint32_t, from->count);
-  p->order = ORB_NEW(m->ctx, uint32_t, p->vertex_count);
-  orb_status status = indices && p->order ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int32_t i = 0; status == ORB_OK && i < from->count; i++) {
+  *count = (size_t)from->count;
+  for (int32_t i = 0; out && i < from->count; i++) {
     const unsigned char *at = from->bytes + (size_t)i * (size_t)from->stride;
-    indices[i] = wide ? orb_read_u32(at, 0) : orb_read_u16(at, 0);
-    status = indices[i] < (uint32_t)p->vertex_count ? ORB_OK : orb_source_corrupt(m->ctx);
+    out[i] = wide ? orb_read_u32(at, 0) : orb_read_u16(at, 0);
+    if (out[i] >= (uint32_t)vertex_count) {
+      return orb_source_corrupt(m->ctx);
+    }
+  }
+  return ORB_OK;
+}
+
+/* Vertices that no triangle uses come after the others. */
+static void order_unused(part *p) {
+  uint32_t next = 0;
+  for (int32_t v = 0; v < p->vertex_count; v++) {
+    next += p->order[v] < (uint32_t)p->vertex_count;
+  }
+  for (int32_t v = 0; v < p->vertex_count; v++) {
+    if (p->order[v] >= (uint32_t)p->vertex_count) {
+      p->order[v] = next++;
+    }
+  }
+}
+
+/* Makes the streams of the indices from those of all primitives of the part, one after another. */
+static orb_status write_indices(maker *m, const part *p, const uint32_t *all, const size_t *counts) {
+  const cJSON *primitive = p->first;
+  for (int32_t i = 0; i < p->primitive_count; i++, primitive = primitive->next) {
+    uint32_t *own = ORB_NEW(m->ctx, uint32_t, counts[i]);
+    orb_stream *stream = &m->streams[orb_source_number(primitive, "indices")];
+    if (!own) {
+      return ORB_E_NO_MEMORY;
+    }
+    memcpy(own, all, counts[i] * sizeof *own);
+    all += counts[i];
+    if (stream->bytes) {
+      orb_free(m->ctx, own);
+      return orb_source_corrupt(m->ctx);
+    }
+    ORB_TRY(orb_attribute_indices(m->ctx, own, (int32_t)counts[i], p->vertex_count, stream));
+  }
+  return ORB_OK;
+}
+
+/* Reorders the triangles of each primitive and the vertices. */
+static orb_status order_part(maker *m, part *p) {
+  size_t *counts = ORB_NEW(m->ctx, size_t, p->primitive_count), total = 0;
+  uint32_t *all = NULL;
+  orb_status status = counts ? ORB_OK : ORB_E_NO_MEMORY;
+  const cJSON *primitive = p->first;
+  for (int32_t i = 0; status == ORB_OK && i < p->primitive_count; i++, primitive = primitive->next) {
+    status = read_indices(m, primitive, p->vertex_count, &counts[i], NULL);
+    total += status == ORB_OK ? counts[i] : 0;
   }
   if (status == ORB_OK) {
-    status = orb_codec_order(m->ctx, indices, (size_t)from->count, (size_t)p->vertex_count, p->order);
+    all = ORB_NEW(m->ctx, uint32_t, total);
+    p->order = ORB_NEW(m->ctx, uint32_t, p->vertex_count);
+    status = all && p->order ? ORB_OK : ORB_E_NO_MEMORY;
   }
-  for (int32_t i = 0; status == ORB_OK && i < p->vertex_count; i++) { /* a vertex without a triangle has no number */
-    status = p->order[i] < (uint32_t)p->vertex_count ? ORB_OK : orb_source_corrupt(m->ctx);
+  primitive = p->first;
+  for (size_t i = 0, at = 0; status == ORB_OK && i < (size_t)p->primitive_count; i++, primitive = primitive->next) {
+    status = read_indices(m, primitive, p->vertex_count, &counts[i], all + at);
+    at += counts[i];
   }
-  if (status != ORB_OK) {
-    orb_free(m->ctx, indices);
-    return status;
+  if (status == ORB_OK) {
+    status = orb_codec_order(m->ctx, all, counts, (size_t)p->primitive_count, (size_t)p->vertex_count, p->order);
   }
-  return orb_attribute_indices(m->ctx, indices, from->count, p->vertex_count, &m->streams[number]);
+  if (status == ORB_OK) {
+    order_unused(p);
+    status = write_indices(m, p, all, counts);
+  }
+  orb_free(m->ctx, counts);
+  orb_free(m->ctx, all);
+  return status;
 }
 
 static orb_status make_positions(maker *m, part *p) {
@@ -187,9 +244,11 @@ static void free_part(orb_context *ctx, part *p) {
   orb_free(ctx, p->order);
 }
 
-static orb_status make_part(maker *m, const cJSON *primitive) {
-  part p = {.attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes"),
-            .targets = cJSON_GetObjectItemCaseSensitive(primitive, "targets")};
+static orb_status make_part(maker *m, const cJSON *primitive, int32_t primitive_count) {
+  part p = {.first = primitive,
+            .attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes"),
+            .targets = cJSON_GetObjectItemCaseSensitive(primitive, "targets"),
+            .primitive_count = primitive_count};
   const cJSON *target;
   orb_status status;
   p.position = orb_source_number(p.attributes, "POSITION"); /* orb_grid_choose() has checked it */
@@ -200,7 +259,7 @@ static orb_status make_part(maker *m, const cJSON *primitive) {
     return orb_source_corrupt(m->ctx);
   }
   if (!m->only_facts) {
-    ORB_GO(status, order_part(m, primitive, &p), done);
+    ORB_GO(status, order_part(m, &p), done);
   }
   ORB_GO(status, make_positions(m, &p), done);
   ORB_GO(status, make_normals(m, &p), done);
@@ -230,8 +289,34 @@ static const cJSON *primitives_of(const cJSON *document) {
   return fine && cJSON_GetArraySize(primitives) > 0 ? primitives : NULL;
 }
 
+/* Whether two primitives have the same accessors of vertices. */
+static int shares_vertices(const cJSON *a, const cJSON *b) {
+  static const char *const members[] = {"attributes", "targets"};
+  for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
+    const cJSON *of_a = cJSON_GetObjectItemCaseSensitive(a, members[i]),
+                *of_b = cJSON_GetObjectItemCaseSensitive(b, members[i]);
+    if ((of_a || of_b) && !cJSON_Compare(of_a, of_b, 1)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+static orb_status make_parts(maker *m, const cJSON *primitives) {
+  const cJSON *first = cJSON_GetArrayItem(primitives, 0), *primitive;
+  int shared = first->next && shares_vertices(first, first->next);
+  cJSON_ArrayForEach(primitive, primitives) {
+    if (!shared || primitive == first) {
+      ORB_TRY(make_part(m, primitive, shared ? cJSON_GetArraySize(primitives) : 1));
+    } else if (!shares_vertices(first, primitive)) { /* all share them, or none: see orb_asset_write_template() */
+      return orb_source_corrupt(m->ctx);
+    }
+  }
+  return ORB_OK;
+}
+
 static orb_status make_streams(maker *m, int32_t levels) {
-  const cJSON *primitive, *primitives = primitives_of(m->source.document);
+  const cJSON *primitives = primitives_of(m->source.document);
   m->streams = ORB_NEW0(m->ctx, orb_stream, m->source.accessor_count);
   if (!m->streams) {
     return ORB_E_NO_MEMORY;
@@ -240,10 +325,7 @@ static orb_status make_streams(maker *m, int32_t levels) {
     return orb_source_corrupt(m->ctx);
   }
   ORB_TRY(orb_grid_choose(m->ctx, &m->source, primitives, levels, &m->grid));
-  cJSON_ArrayForEach(primitive, primitives) {
-    ORB_TRY(make_part(m, primitive));
-  }
-  return ORB_OK;
+  return make_parts(m, primitives);
 }
 
 orb_status orb_profile_write(orb_context *ctx, const unsigned char *asset, size_t size, orb_profile profile,

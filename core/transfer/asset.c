@@ -56,7 +56,9 @@ static void draft_free(orb_context *ctx, orb_draft *draft) {
   }
   for (int32_t p = 0; p < draft->part_count; p++) {
     orb_free(ctx, draft->parts[p].indices);
-    orb_free(ctx, draft->parts[p].corners);
+    if (p == 0 || !draft->shares_vertices) {
+      orb_free(ctx, draft->parts[p].corners);
+    }
   }
   orb_wedges_free(ctx, &draft->texcoords);
   orb_free(ctx, draft->positions);

@@ -38,6 +38,7 @@ typedef struct orb_draft {
   int has_holes; /* triangles whose home fills a hole of the first shape are omitted */
   int32_t part_count;
   orb_draft_part *parts;
+  int shares_vertices; /* all parts have the vertices of the first one, which owns the list of their corners */
   int32_t nudged;
 } orb_draft;
 

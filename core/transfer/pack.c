@@ -106,13 +106,10 @@ static orb_status add_wedges(packer *pack, const orb_draft_part *part, const orb
   return add_floats(pack, pack->scratch, part->vertex_count, width, ORB_GLTF_ARRAY_BUFFER, 0, out);
 }
 
-static orb_status add_part(packer *pack, const orb_draft_part *part, orb_gltf_primitive *primitive,
-                           orb_gltf_attributes *targets) {
+static orb_status add_vertices(packer *pack, const orb_draft_part *part, orb_gltf_primitive *primitive,
+                               orb_gltf_attributes *targets) {
   const orb_draft *draft = pack->draft;
-  primitive->material = draft->shapes[0].mesh.material_count > 0 ? part->material : 0;
   primitive->base = (orb_gltf_attributes){-1, -1, -1, -1, -1};
-  primitive->targets = targets;
-  ORB_TRY(add_indices(pack, part, &primitive->indices));
   ORB_TRY(add_positions(pack, part, draft->base, &primitive->base.position));
   if (draft->normals) {
     ORB_TRY(add_wedges(pack, part, &draft->normals[0], NULL, &primitive->base.normal));
@@ -141,6 +138,23 @@ static orb_status add_part(packer *pack, const orb_draft_part *part, orb_gltf_pr
     }
     ORB_TRY(orb_context_check(pack->ctx));
   }
+  return ORB_OK;
+}
+
+/* Adds a part. Parts that share their vertices have the accessors of the first one. */
+static orb_status add_part(packer *pack, int32_t number, orb_gltf_primitive *primitives, orb_gltf_attributes *targets) {
+  const orb_draft *draft = pack->draft;
+  const orb_draft_part *part = &draft->parts[number];
+  orb_gltf_primitive *primitive = &primitives[number];
+  int64_t target_count = draft->frame_count - 1;
+  primitive->material = draft->shapes[0].mesh.material_count > 0 ? part->material : 0;
+  primitive->targets = targets + number * target_count;
+  ORB_TRY(add_indices(pack, part, &primitive->indices));
+  if (number == 0 || !draft->shares_vertices) {
+    return add_vertices(pack, part, primitive, targets + number * target_count);
+  }
+  primitive->base = primitives[0].base;
+  memcpy(targets + number * target_count, targets, (size_t)target_count * sizeof *targets);
   return ORB_OK;
 }
 
@@ -215,7 +229,7 @@ static orb_status write_scene(packer *pack, orb_gltf_scene *scene, orb_gltf_prim
   *facts = (orb_asset_facts){
       .primitive_count = draft->part_count, .target_count = draft->frame_count - 1, .nudged_vertices = draft->nudged};
   for (int32_t p = 0; p < draft->part_count; p++) {
-    ORB_TRY(add_part(pack, &draft->parts[p], &primitives[p], targets + (int64_t)p * facts->target_count));
+    ORB_TRY(add_part(pack, p, primitives, targets));
     facts->vertex_count += draft->parts[p].vertex_count;
     facts->triangle_count += draft->parts[p].triangle_count;
     orb_progress(pack->ctx, "write", 0.5 + 0.4 * (p + 1) / draft->part_count);

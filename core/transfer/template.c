@@ -10,7 +10,7 @@
 #include "mesh/normals.h"
 #include "numeric/rotate_along.h"
 
-enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
+enum { CHECK_EVERY = 65536 }; /* corners or triangles between two checks for cancellation */
 
 /* What a corner of the file has besides its vertex; a vertex whose corners differ gets copies. */
 typedef struct corner_value {
@@ -80,6 +80,13 @@ static int32_t vertex_for(maker *m, int32_t v, const corner_value *value) {
   return m->count++;
 }
 
+static orb_status too_large(orb_context *ctx, const char *what) {
+  orb_status status = orb_fail(ctx, ORB_E_TOO_LARGE,
+                               "The first shape has too many %s for the method 'template'; use 'adaptive'.", what);
+  orb_context_error_edit(ctx)->shape = 0;
+  return status;
+}
+
 /* Fills the triangles of `made`. After them come the vertices by number, so that 3 · triangles + v is a corner of v. */
 static orb_status make_vertices(maker *m, orb_template *made) {
   int64_t corners = 3 * (int64_t)m->file->triangle_count;
@@ -98,9 +105,7 @@ static orb_status make_vertices(maker *m, orb_template *made) {
     status = triangles[h] < 0 ? ORB_E_NO_MEMORY : h % CHECK_EVERY == 0 ? orb_context_check(m->ctx) : ORB_OK;
   }
   if (status == ORB_OK && corners + m->count > INT32_MAX) {
-    status = orb_fail(m->ctx, ORB_E_TOO_LARGE,
-                      "The first shape has too many triangles for the method 'template'; use 'adaptive'.");
-    orb_context_error_edit(m->ctx)->shape = 0;
+    status = too_large(m->ctx, "triangles");
   }
   if (status == ORB_OK) {
     made->mesh.triangles = ORB_NEW(m->ctx, int32_t, corners + m->count);
@@ -241,57 +246,58 @@ static int32_t material_of(const maker *m, int32_t t) {
   return material >= 0 && material < count ? material : 0;
 }
 
-/* Fills a part: its triangles, and the vertices that they use (all of them if it is the only part), in their order. */
-static orb_status fill_part(const maker *m, const orb_template *made, int is_only, int32_t *number,
-                            orb_draft_part *part) {
-  int64_t corners = 3 * (int64_t)made->mesh.triangle_count, next = 0;
-  memset(number, is_only ? 0 : -1, (size_t)m->count * sizeof *number);
-  for (int64_t h = 0; h < corners; h++) {
-    if (material_of(m, (int32_t)(h / 3)) == part->material) {
-      number[made->mesh.triangles[h]] = 0;
-      next++;
+/* Adds an empty part for each material that triangles have. part_of: receives the part of each material. */
+static orb_status add_parts(const maker *m, int32_t material_count, int32_t *part_of, orb_draft *out) {
+  int32_t *used = ORB_NEW0(m->ctx, int32_t, material_count);
+  orb_status status = used ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t t = 0; status == ORB_OK && t < m->file->triangle_count; t++) {
+    used[material_of(m, t)]++;
+  }
+  for (int32_t k = 0; status == ORB_OK && k < material_count; k++) {
+    if (used[k] > 0) {
+      orb_draft_part *part = &out->parts[out->part_count];
+      part_of[k] = out->part_count++;
+      part->material = k;
+      part->vertex_count = m->count;
+      part->indices = ORB_NEW(m->ctx, uint32_t, 3 * (int64_t)used[k]);
+      status = part->indices ? ORB_OK : ORB_E_NO_MEMORY;
     }
   }
-  for (int32_t v = 0; v < m->count; v++) {
-    number[v] = number[v] == 0 ? part->vertex_count++ : -1;
+  orb_free(m->ctx, used);
+  return status;
+}
+
+/* The corners of all vertices, which all parts share: so the asset has each vertex once, in the order of the file. */
+static orb_status make_corners(const maker *m, const orb_template *made, orb_draft *out) {
+  int32_t *corners = out->parts[0].corners = ORB_NEW(m->ctx, int32_t, m->count);
+  for (int32_t v = 0; corners && v < m->count; v++) {
+    corners[v] = 3 * made->mesh.triangle_count + v;
   }
-  part->triangle_count = (int32_t)(next / 3);
-  part->indices = ORB_NEW(m->ctx, uint32_t, next);
-  part->corners = ORB_NEW(m->ctx, int32_t, part->vertex_count);
-  if (!part->indices || !part->corners) {
-    return ORB_E_NO_MEMORY;
+  for (int32_t p = 1; p < out->part_count; p++) {
+    out->parts[p].corners = corners;
   }
-  for (int32_t v = 0; v < m->count; v++) {
-    if (number[v] >= 0) {
-      part->corners[number[v]] = (int32_t)(corners + v);
-    }
-  }
-  next = 0;
-  for (int64_t h = 0; h < corners; h++) {
-    if (material_of(m, (int32_t)(h / 3)) == part->material) {
-      part->indices[next++] = (uint32_t)number[made->mesh.triangles[h]];
-    }
-  }
-  return orb_context_check(m->ctx);
+  out->shares_vertices = 1;
+  return corners ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
 static orb_status make_parts(const maker *m, const orb_template *made, orb_draft *out) {
   int32_t materials = m->draft->shapes[0].mesh.material_count > 0 ? m->draft->shapes[0].mesh.material_count : 1;
-  int32_t *used = ORB_NEW0(m->ctx, int32_t, materials), *number = ORB_NEW(m->ctx, int32_t, m->count), kinds = 0;
+  int32_t *part_of = ORB_NEW(m->ctx, int32_t, materials);
   out->parts = ORB_NEW0(m->ctx, orb_draft_part, materials);
-  orb_status status = used && number && out->parts ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_status status = part_of && out->parts ? add_parts(m, materials, part_of, out) : ORB_E_NO_MEMORY;
   for (int32_t t = 0; status == ORB_OK && t < made->mesh.triangle_count; t++) {
-    kinds += used[material_of(m, t)]++ == 0;
-  }
-  for (int32_t k = 0; status == ORB_OK && k < materials; k++) {
-    if (used[k] > 0) {
-      out->parts[out->part_count].material = k;
-      status = fill_part(m, made, kinds == 1, number, &out->parts[out->part_count++]);
+    orb_draft_part *part = &out->parts[part_of[material_of(m, t)]];
+    uint32_t *to = part->indices + 3 * (int64_t)part->triangle_count++;
+    for (int k = 0; k < 3; k++) {
+      to[k] = (uint32_t)made->mesh.triangles[3 * (int64_t)t + k];
     }
+    status = t % CHECK_EVERY == 0 ? orb_context_check(m->ctx) : ORB_OK;
   }
-  orb_free(m->ctx, used);
-  orb_free(m->ctx, number);
-  return status;
+  if (status == ORB_OK && (int64_t)out->part_count * m->count > INT32_MAX) { /* what lists them has one a part */
+    status = too_large(m->ctx, "materials");
+  }
+  orb_free(m->ctx, part_of);
+  return status == ORB_OK ? make_corners(m, made, out) : status;
 }
 
 orb_status orb_template_draft(orb_context *ctx, const orb_draft *draft, const orb_mesh *file, orb_template *made,

@@ -12,7 +12,8 @@ typedef struct orb_template {
 
 /* Makes the draft of `file`, the first shape as orb_mesh_read() gave it, from that of the supermesh, which has its
  * frames (positions in doubles). A vertex whose corners have several texture coordinates, normals or colours gets a
- * copy for each further one, after all vertices of the file. Triangles keep their order within their material. Normals
+ * copy for each further one, after all vertices of the file. Triangles keep their order within their material,
+ * and the parts share all vertices. Normals
  * of the first frame are the file's, else smooth; those of the others are rotated as the smooth normal is. Free both
  * also after an error: `out` refers to `draft` and `made`. O(V·F). */
 ORB_MUST_CHECK orb_status orb_template_draft(orb_context *ctx, const orb_draft *draft, const orb_mesh *file,

@@ -8,6 +8,7 @@ import * as shapes from '../scenario/support/shapes.mjs';
 let validator;
 let three;
 let GLTFLoader;
+let MeshoptDecoder;
 try {
   validator = (await import('gltf-validator')).default;
   three = await import('three');
@@ -15,6 +16,7 @@ try {
   // The test ignores pictures; the loader only needs decoding to succeed.
   globalThis.createImageBitmap ??= async () => ({ width: 1, height: 1, close() {} });
   ({ GLTFLoader } = await import('three/addons/loaders/GLTFLoader.js'));
+  ({ MeshoptDecoder } = await import('three/addons/libs/meshopt_decoder.module.js'));
 } catch {
   console.log('the npm packages are missing: npm ci in tests/');
   process.exit(0);
@@ -109,5 +111,61 @@ test('a rigged character with two new shape keys: validator, three.js, skin and 
       moved += sum.distanceTo(new three.Vector3(...rest[p][v])) > 0.1;
     }
     assert.ok(p === 0 || moved > bent.length / 4, 'the joints bend the target');
+  }
+});
+
+test('an OBJ of three materials: the primitives share their vertices, in every profile', async (t) => {
+  const d = await daemon(t);
+  const base = shapes.egg(3);
+  const kindOf = (i) => (i * 7) % 3;
+  const text =
+    [...base.positions, [7, 8, 9]].map((p) => `v ${p.join(' ')}\n`).join('') +
+    base.triangles.map((f, i) => `usemtl m${kindOf(i)}\nf ${f.map((v) => v + 1).join(' ')}\n`).join('');
+  const first = (await d.upload(text, { name: 'egg' })).json;
+  const second = (await d.upload(shapes.obj(shapes.bean(3)), { name: 'bean' })).json;
+  const made = await d.made('/v1/supermeshes', {
+    shapes: [{ mesh: first.id }, { mesh: second.id }],
+    align: { method: 'rotate' },
+    remesh: { method: 'template' },
+    asset: { fit: 'none' },
+  });
+  /** The triangles of a profile by material, as points of the target, sorted. */
+  const drawn = async (profile) => {
+    const { bytes } = await d.get(`${made.asset}?profile=${profile}`);
+    assert.deepEqual(await complaints(bytes), [], profile);
+    const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
+    const { scene } = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(buffer, '');
+    scene.updateMatrixWorld(true);
+    const parts = {};
+    scene.traverse((mesh) => {
+      if (!mesh.isMesh) return;
+      mesh.morphTargetInfluences[0] = 1;
+      assert.equal(mesh.geometry.attributes.position.count, base.positions.length + 1, profile);
+      const at = Array.from({ length: mesh.geometry.attributes.position.count }, (_, v) =>
+        mesh.getVertexPosition(v, new three.Vector3()).applyMatrix4(mesh.matrixWorld),
+      );
+      const index = [...mesh.geometry.index.array];
+      parts[mesh.material.name] = index.map((v) => at[v]);
+    });
+    return parts;
+  };
+  const plain = await drawn('float');
+  assert.deepEqual(Object.keys(plain).sort(), ['m0', 'm1', 'm2']);
+  for (const profile of ['quantized', 'meshopt']) {
+    const parts = await drawn(profile);
+    for (const [name, corners] of Object.entries(plain)) {
+      assert.equal(parts[name].length, corners.length);
+      const centers = (list) =>
+        Array.from({ length: list.length / 3 }, (_, i) =>
+          list[3 * i]
+            .clone()
+            .add(list[3 * i + 1])
+            .add(list[3 * i + 2])
+            .divideScalar(3),
+        );
+      const theirs = centers(parts[name]);
+      for (const center of centers(corners))
+        assert.ok(Math.min(...theirs.map((other) => other.distanceTo(center))) < 1e-3, `${profile}, ${name}`);
+    }
   }
 });

@@ -218,6 +218,47 @@ test('an OBJ vertex with several texture coordinates gets copies after all verti
   });
 });
 
+test('an OBJ of several materials keeps its vertices once and in their order', async (t) => {
+  const d = await daemon(t);
+  const base = shapes.egg(2);
+  const names = ['skin', 'cloth', 'hair'];
+  const kindOf = (i) => (i * 7) % 3; // neighbours have different materials: nearly all vertices lie on a border
+  const lone = [7, 8, 9]; // no triangle uses it
+  const text =
+    [...base.positions, lone].map((p) => `v ${p.join(' ')}\n`).join('') +
+    base.triangles.map((f, i) => `usemtl ${names[kindOf(i)]}\nf ${f.map((v) => v + 1).join(' ')}\n`).join('');
+  const colors = base.positions.map((p) => p.map((x) => (1 + Math.sin(5 * x)) / 2));
+  const first = (await d.upload(text, { name: 'egg' })).json;
+  const second = (await d.upload(writeGlb({ ...base, colors }), { name: 'painted' })).json;
+  const order = { shapes: [{ mesh: first.id }, { mesh: second.id }], align: { method: 'rotate' }, remesh };
+  const plain = await d.made('/v1/supermeshes', order);
+  const dressed = await d.made('/v1/supermeshes', { ...order, transfer: [{ from: 1, what: 'color' }] });
+  for (const made of [plain, dressed]) {
+    const { gltf, read } = parseGlb((await d.get(made.asset)).bytes);
+    const { primitives } = gltf.meshes[0];
+    assert.deepEqual(
+      primitives.map(({ material }) => gltf.materials[material].name),
+      names,
+    );
+    for (const { attributes, targets } of primitives)
+      assert.deepEqual(
+        { attributes, targets },
+        { attributes: primitives[0].attributes, targets: primitives[0].targets },
+      );
+    assert.deepEqual(
+      [...read(primitives[0].attributes.POSITION)],
+      [...base.positions, lone].flat().map(Math.fround),
+      'each vertex once, as in the file',
+    );
+    for (const [k, { indices }] of primitives.entries())
+      assert.deepEqual([...read(indices)], base.triangles.filter((_, i) => kindOf(i) === k).flat());
+  }
+  const { gltf, read } = parseGlb((await d.get(dressed.asset)).bytes);
+  const painted = [...read(gltf.meshes[0].primitives[0].attributes.COLOR_0)];
+  assert.equal(painted.length, 4 * (base.positions.length + 1));
+  assert.ok(new Set(painted).size > 50, 'the colours came along');
+});
+
 test('where the template is too coarse for a shape, its triangles are named, the farthest first', async (t) => {
   const d = await daemon(t);
   const plain = shapes.ball(3);

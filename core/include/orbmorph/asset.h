@@ -46,7 +46,7 @@ ORB_API void orb_asset_defaults(orb_asset_options *options);
 
 /* What was written. */
 typedef struct orb_asset_facts {
-  int32_t vertex_count;       /* after splits for normals, seams and materials */
+  int32_t vertex_count;       /* of the primitives, one after another; after splits for normals, seams, materials */
   int32_t triangle_count;     /* without those that fill holes of the first shape that are open again */
   int32_t primitive_count;    /* one for each material that is used */
   int32_t target_count;       /* later shapes, then in-betweens, then those of the options */
@@ -105,8 +105,10 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write_mapped(orb_context *ctx, const
 /* As orb_asset_write_mapped(), for a supermesh of ORB_REMESH_TEMPLATE: the vertices and triangles of the base are those
  * of `file`, the first shape as orb_mesh_read() gave it, before repairs. Nothing is welded, nudged or omitted; a
  * vertex whose corners have several texture coordinates, normals or colours gets copies after the others. Triangles
- * keep their order within their material, and there is a primitive for each material. Vertices of the file that are not
- * on the closed surface stay where they are in every target; their entry in *vertices is −1. No tangents and no colours
+ * keep their order within their material, and there is a primitive for each material. All primitives have the same
+ * accessors of vertices, so each vertex is in the asset once; *vertices and facts->vertex_count have it once for each
+ * primitive. ORB_E_TOO_LARGE: with that they would have more than 2³¹ − 1. Vertices of the file that are not on the
+ * closed surface stay where they are in every target; their entry in *vertices is −1. No tangents and no colours
  * of later shapes are written. */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_write_template(orb_context *ctx, const orb_supermesh *supermesh,
                                                            const orb_aligned_shape *shapes, const orb_mesh *file,
