@@ -91,10 +91,16 @@ static orb_document document_of(const orb_merge_options *options) {
   return (orb_document){options->file, options->file_bytes, options->file_size, options->file_parts};
 }
 
-/* Parts of a document are named, and the first shape has none: the error lists them. */
-static orb_status refuse_parts(orb_context *ctx, const orb_document_parts *parts) {
-  orb_status status = orb_fail(
-      ctx, ORB_E_BAD_OPTION, "\"template\" names meshes or nodes, but the first shape is not glTF; omit that member.");
+/* Parts of a document are named, and no document is kept: the error lists them. */
+static orb_status refuse_parts(orb_context *ctx, const orb_document_parts *parts, orb_remesh_method method) {
+  orb_status status =
+      method == ORB_REMESH_TEMPLATE
+          ? orb_fail(ctx, ORB_E_BAD_OPTION,
+                     "\"template\" names meshes or nodes, but the first shape is not glTF; omit that member.")
+          : orb_fail(ctx, ORB_E_BAD_OPTION,
+                     "\"template\" names meshes or nodes of a document that the method '%s' does not keep; omit that "
+                     "member, or use the method 'template'.",
+                     orb_remesh_method_name(method));
   orb_error *error = orb_context_error_edit(ctx);
   error->shape = 0;
   error->element_total = (int64_t)parts->mesh_count + parts->node_count;
@@ -110,13 +116,26 @@ static orb_status refuse_parts(orb_context *ctx, const orb_document_parts *parts
   return status;
 }
 
+/* A template has the triangles of the first shape, however many a request allows. */
+static orb_status check_limit(orb_context *ctx, const orb_mesh *first, const orb_remesh_options *remesh) {
+  if (remesh->method != ORB_REMESH_TEMPLATE || remesh->max_triangles == 0 ||
+      first->triangle_count <= remesh->max_triangles) {
+    return ORB_OK;
+  }
+  return orb_fail(
+      ctx, ORB_E_BAD_OPTION,
+      "The method 'template' keeps the %d triangles of the first shape, more than max_triangles = %lld; omit "
+      "that member, or use 'adaptive' for fewer.",
+      first->triangle_count, (long long)remesh->max_triangles);
+}
+
 orb_status orb_merge_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                            const orb_merge_options *options) {
   const int is_document = keeps_document(options);
   ORB_TRY(check_shapes(ctx, shapes, shape_count));
-  if (!is_document && options->remesh.method == ORB_REMESH_TEMPLATE &&
-      options->file_parts.mesh_count + options->file_parts.node_count > 0) {
-    return refuse_parts(ctx, &options->file_parts);
+  ORB_TRY(check_limit(ctx, shapes[0].mesh, &options->remesh));
+  if (!is_document && options->file_parts.mesh_count + options->file_parts.node_count > 0) {
+    return refuse_parts(ctx, &options->file_parts, options->remesh.method);
   }
   if (is_document) {
     orb_document document = document_of(options);

@@ -137,6 +137,18 @@ static orb_status run_method(orb_context *ctx, const orb_remesh_job *job, orb_su
   return run(ctx, job, out);
 }
 
+/* A method that keeps the given triangles cannot make fewer of them: it refuses instead. */
+static orb_status refuse_more(orb_context *ctx, const orb_remesh_options *options, const orb_supermesh *made) {
+  if (options->max_triangles == 0 || made->triangle_count <= options->max_triangles) {
+    return ORB_OK;
+  }
+  return orb_fail(
+      ctx, ORB_E_BAD_OPTION,
+      "The method '%s' makes %d triangles here, more than max_triangles = %lld; raise it, or use 'adaptive' "
+      "for fewer.",
+      orb_remesh_method_name(options->method), made->triangle_count, (long long)options->max_triangles);
+}
+
 orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count, int32_t landmark_count,
                       const orb_remesh_options *options, orb_supermesh *out) {
   memset(out, 0, sizeof *out);
@@ -173,6 +185,9 @@ orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t
   job.options = &tight;
   if (status == ORB_OK) {
     status = run_method(ctx, &job, out);
+  }
+  if (status == ORB_OK) {
+    status = refuse_more(ctx, options, out);
   }
   job.options = options;
   out->has_rims = options->method == ORB_REMESH_OVERLAY || options->method == ORB_REMESH_TEMPLATE;

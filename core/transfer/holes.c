@@ -179,6 +179,10 @@ orb_status orb_dropped_holes(orb_context *ctx, const orb_supermesh *supermesh, c
                             "Their rims could not be made edges, so they stay filled; the methods overlay and template "
                             "always reopen them."));
   }
+  if (is_open && options->holes == ORB_HOLES_FILLED) {
+    ORB_TRY(orb_dropped_add(ctx, list, count, "fills", "shapes[0]",
+                            "A template has exactly the triangles of its file, so its holes stay open."));
+  }
   for (int32_t s = 1; s < supermesh->shape_count; s++) {
     char where[32];
     (void)snprintf(where, sizeof where, "shapes[%d]", s);

@@ -107,7 +107,6 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
     in->request.merge.file = &file->mesh;
     in->request.merge.file_bytes = file->bytes;
     in->request.merge.file_size = file->size;
-    api_supermesh_request_parts(&in->request, in->nodes, &in->request.merge.file_parts);
   }
   if (file) {
     in->shape_files[s] = (orb_shape_file){in->corners[s], file->bytes, file->size};
@@ -139,6 +138,7 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, api
   in->request.merge.carries = in->request.carries;
   in->request.merge.carry_count = in->request.carry_count;
   in->request.merge.files = in->shape_files;
+  api_supermesh_request_parts(&in->request, in->nodes, &in->request.merge.file_parts);
   for (int32_t s = 0; s < in->request.shape_count; s++) {
     in->names[s] = in->request.shapes[s].name;
     progress_report(env->progress, "read", (double)s / (double)in->request.shape_count);

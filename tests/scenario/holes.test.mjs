@@ -268,6 +268,9 @@ test('holes of a later shape stay filled, and the report names them', async (t) 
   assert.deepEqual(rimOf(triple(covered.shapes[0]), triple(covered.triangles)), []);
   assert.deepEqual(filled.dropped, []);
   assert.equal(filled.open_holes, undefined);
+  const kept = await d.made('/v1/supermeshes', asked([opened, closed], { method: 'template' }, 'filled'));
+  assert.equal(kept.open_holes, 4);
+  assert.match(kept.dropped.find(({ what }) => what === 'fills').why, /exactly the triangles of its file/);
 
   const both = await d.made('/v1/supermeshes', asked([opened, await upload(d, open[4][1], 'other', 'fill_holes')], {}));
   assertRims((await d.get(both.asset)).bytes, mask, count, 'both open');

@@ -293,7 +293,29 @@ test('a request names the meshes or nodes that are the surface', async (t) => {
   const obj = { ...request, shapes: [...request.shapes].reverse(), template: { meshes: [0], nodes: ['body'] } };
   const { problem } = await d.make('/v1/supermeshes', obj);
   assert.match(problem.detail, /the first shape is not glTF/);
-  assert.deepEqual([problem.shape, problem.elements], [0, [{ where: 'meshes[0]' }, { where: 'nodes', name: 'body' }]]);
+  const listed = [{ where: 'meshes[0]' }, { where: 'nodes', name: 'body' }];
+  assert.deepEqual([problem.shape, problem.elements], [0, listed]);
+  const other = (await d.make('/v1/supermeshes', { ...obj, remesh: { method: 'overlay' } })).problem;
+  assert.match(other.detail, /that the method 'overlay' does not keep; omit that member, or use the method 'template'/);
+  assert.deepEqual([other.type, other.elements], ['/problems/bad-option', listed]);
+});
+
+test('a limit below the triangles of the template is refused', async (t) => {
+  const d = await daemon(t);
+  const egg = shapes.egg(2);
+  const request = await merge(d, writeGlb(egg), { name: 'egg' }, [shapes.bean(2)]);
+  const count = egg.triangles.length;
+  for (const [method, most, why] of [
+    ['template', count - 1, new RegExp(`keeps the ${count} triangles of the first shape, more than max_triangles`)],
+    ['overlay', count, /'overlay' makes \d+ triangles here, more than max_triangles/],
+    ['subdivision', 8, /'subdivision' makes \d+ triangles here, more than max_triangles/],
+  ]) {
+    const { problem } = await d.make('/v1/supermeshes', { ...request, remesh: { method, max_triangles: most } });
+    assert.equal(problem?.type, '/problems/bad-option', method);
+    assert.match(problem.detail, why);
+  }
+  const made = await d.made('/v1/supermeshes', { ...request, remesh: { method: 'template', max_triangles: count } });
+  assert.equal(made.triangles, count);
 });
 
 test('the surface has a mesh that the request does not name', async (t) => {

@@ -79,7 +79,7 @@ static int64_t triangles_with(orb_remesh_method method, double tolerance, int64_
   return triangles;
 }
 
-/* An option that a method heeds changes its result; one that it does not heed changes nothing. */
+/* An option that a method heeds changes its result, or is refused; one that it does not heed changes nothing. */
 static void methods_heed_what_the_registry_says(void **state) {
   (void)state;
   for (int i = 0; i < ORB_REMESH_METHOD_COUNT; i++) {

@@ -23,7 +23,7 @@ ORB_API int orb_remesh_method_of_name(const char *name, orb_remesh_method *out);
 /* 1 if this build has the method; otherwise 0, and orb_remesh() returns ORB_E_UNSUPPORTED. */
 ORB_API int orb_remesh_available(orb_remesh_method method);
 /* The options that the method uses, as a sum of these bits; it ignores the others, so a user interface can hide them.
- */
+ * All methods but adaptive keep what is given and refuse a max_triangles that is too small for it. */
 enum { ORB_REMESH_HEEDS_TOLERANCE = 1, ORB_REMESH_HEEDS_MAX_TRIANGLES = 2 };
 ORB_API unsigned orb_remesh_heeds(orb_remesh_method method);
 
@@ -32,8 +32,9 @@ typedef struct orb_remesh_options {
   /* Largest position error, relative to each shape's diagonal; default: 0.001. A method that uses it stays within it,
    * up to rounding (1e-12), unless max_triangles is too small for that. */
   double tolerance;
-  int64_t max_triangles; /* takes precedence over the tolerance; 0 (default): no limit */
-  int rims;              /* 1: the rims of the first shape's filled holes become edges, see has_rims; default: 0 */
+  /* Takes precedence over the tolerance; 0 (default): no limit. ORB_E_BAD_OPTION: the method needs more. */
+  int64_t max_triangles;
+  int rims; /* 1: the rims of the first shape's filled holes become edges, see has_rims; default: 0 */
 } orb_remesh_options;
 ORB_API void orb_remesh_defaults(orb_remesh_options *options);
 

@@ -8,9 +8,9 @@
 
 #define ORB_REMESH_METHODS(METHOD)                                                                    \
   METHOD(ADAPTIVE, adaptive, "adaptive", ORB_REMESH_HEEDS_TOLERANCE | ORB_REMESH_HEEDS_MAX_TRIANGLES) \
-  METHOD(OVERLAY, overlay, "overlay", 0)                                                              \
-  METHOD(SUBDIVISION, subdivision, "subdivision", 0)                                                  \
+  METHOD(OVERLAY, overlay, "overlay", ORB_REMESH_HEEDS_MAX_TRIANGLES)                                 \
+  METHOD(SUBDIVISION, subdivision, "subdivision", ORB_REMESH_HEEDS_MAX_TRIANGLES)                     \
   METHOD(CONVEX_HULL, convex_hull, "convex-hull", ORB_REMESH_HEEDS_MAX_TRIANGLES)                     \
-  METHOD(TEMPLATE, template, "template", 0)
+  METHOD(TEMPLATE, template, "template", ORB_REMESH_HEEDS_MAX_TRIANGLES)
 
 #endif

@@ -41,7 +41,7 @@ export function buildRequest(find = false): SupermeshRequest {
   else if (landmarks.length) request.landmarks = landmarks;
   if (!find && options.align !== 'default') request.align = { method: options.align };
   request.remesh = { method: options.remesh, tolerance: options.tolerance };
-  if (options.maxTriangles) request.remesh.max_triangles = options.maxTriangles;
+  if (options.maxTriangles && options.remesh !== 'template') request.remesh.max_triangles = options.maxTriangles;
   request.asset = { fit: find ? 'none' : options.fit };
   if (options.path !== 'linear') request.asset.path = options.path;
   if (options.holes !== 'reopen') request.asset.holes = options.holes;
