@@ -1,5 +1,6 @@
 #include "api/mesh_codec.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,6 +22,18 @@ enum { KINDS = sizeof kinds / sizeof kinds[0] };
  * detours: none is longer. */
 static const double HANDLE_SIZE_LEAST = 1e-6, HANDLE_SIZE_MOST = 10;
 
+/* Refuses the value of a query parameter; returns 0. */
+API_PRINTF(3, 4) static int refuse(api_problem *problem, const char *parameter, const char *format, ...) {
+  va_list args;
+  va_start(args, format);
+  char detail[512];
+  vsnprintf(detail, sizeof detail, format, args);
+  va_end(args);
+  api_refuse(problem, "bad-query", "%s", detail);
+  api_json_member_string(&problem->facts, "parameter", parameter);
+  return 0;
+}
+
 static int read_handle_size(const char *text, size_t length, orb_repair_options *out, api_problem *problem) {
   char digits[40], *end = digits;
   double size = 0;
@@ -30,9 +43,9 @@ static int read_handle_size(const char *text, size_t length, orb_repair_options 
     size = strtod(digits, &end);
   }
   if (end == digits || *end || !(size >= HANDLE_SIZE_LEAST && size <= HANDLE_SIZE_MOST)) {
-    return api_refuse(problem, "bad-query",
-                      "\"handle_size\" must be a number from 0.000001 to 10, such as 0.05: the length of a loop around "
-                      "a handle relative to the diagonal.");
+    return refuse(problem, "handle_size",
+                  "\"handle_size\" must be a number from 0.000001 to 10, such as 0.05: the length of a loop around "
+                  "a handle relative to the diagonal.");
   }
   snprintf(digits, sizeof digits, "%.9g", size); /* as in the canonical list */
   out->handle_size = strtod(digits, NULL);
@@ -44,11 +57,11 @@ static int read_part(const char *text, orb_repair_options *out, api_problem *pro
   int is_number = length < 10 && strspn(text, "0123456789") == length;
   out->repair |= ORB_REPAIR_PART;
   if (length == 0 || length >= sizeof out->part_name || !api_utf8_valid(text, length)) {
-    return api_refuse(problem, "bad-query", "\"part\" must be a number or a name of 1 to 127 bytes in UTF-8.");
+    return refuse(problem, "part", "\"part\" must be a number or a name of 1 to 127 bytes in UTF-8.");
   }
   for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
     if (*c < 0x20 || *c == 0x7f) {
-      return api_refuse(problem, "bad-query", "\"part\" must not contain control characters.");
+      return refuse(problem, "part", "\"part\" must not contain control characters.");
     }
   }
   out->part = is_number ? (int32_t)strtol(text, NULL, 10) : 0;
@@ -91,10 +104,10 @@ static int read_list(const char *list, orb_repair_options *out, int *none, api_p
         k++;
       }
       if (k == KINDS) {
-        return api_refuse(problem, "bad-query",
-                          "There is no repair \"%.*s\". Use none, safe, fill_holes, largest_component, "
-                          "split_nonmanifold or close_handles.",
-                          (int)(n < 60 ? n : 60), at);
+        return refuse(problem, "repair",
+                      "There is no repair \"%.*s\". Use none, safe, fill_holes, largest_component, "
+                      "split_nonmanifold or close_handles.",
+                      (int)(n < 60 ? n : 60), at);
       }
       *none |= k == 0;
       out->repair |= kinds[k].flag;
@@ -115,10 +128,10 @@ int api_repair_parse(const char *list, const char *handle_size, const char *part
     return 0;
   }
   if (none && out->repair) {
-    return api_refuse(problem, "bad-query", "The repair \"none\" excludes all others. Remove it or the others.");
+    return refuse(problem, "repair", "The repair \"none\" excludes all others. Remove it or the others.");
   }
   if (handle_size && !(out->repair & ORB_REPAIR_CLOSE_HANDLES)) {
-    return api_refuse(problem, "bad-query", "\"handle_size\" needs repair=close_handles. Add it or remove the size.");
+    return refuse(problem, "handle_size", "\"handle_size\" needs repair=close_handles. Add it or remove the size.");
   }
   if (out->repair & ORB_REPAIR_PART) { /* says which piece to keep */
     out->repair &= ~(unsigned)ORB_REPAIR_LARGEST_COMPONENT;
@@ -132,19 +145,18 @@ int api_upload_read(const api_upload_query *query, api_upload *out, api_problem 
   const char *name = query->name;
   memset(out, 0, sizeof *out);
   if (name && (!*name || strlen(name) >= sizeof out->name || !api_utf8_valid(name, strlen(name)))) {
-    return api_refuse(problem, "bad-query", "\"name\" must be UTF-8 of 1 to 127 bytes.");
+    return refuse(problem, "name", "\"name\" must be UTF-8 of 1 to 127 bytes.");
   }
   snprintf(out->name, sizeof out->name, "%s", name ? name : "mesh");
   for (const unsigned char *c = (const unsigned char *)out->name; *c; c++) {
     if (*c < 0x20 || *c == 0x7f) {
-      return api_refuse(problem, "bad-query", "\"name\" must not contain control characters.");
+      return refuse(problem, "name", "\"name\" must not contain control characters.");
     }
   }
   if (query->format) {
     out->hint = orb_format_of_name(query->format);
     if (out->hint == ORB_FORMAT_AUTO) {
-      return api_refuse(problem, "bad-query",
-                        "\"format\" must be obj, off, ply, stl, 3mf, gltf or glb, or be omitted.");
+      return refuse(problem, "format", "\"format\" must be obj, off, ply, stl, 3mf, gltf or glb, or be omitted.");
     }
   }
   return api_repair_parse(query->repair ? query->repair : "safe", query->handle_size, query->part, &out->options,

@@ -412,6 +412,9 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   if (result->open_holes > 0) {
     api_json_member_integer(out, "open_holes", result->open_holes);
   }
+  if (result->asset_facts.triangle_count != result->supermesh.triangle_count) {
+    api_json_member_integer(out, "asset_triangles", result->asset_facts.triangle_count);
+  }
   write_rims(&result->alignment, out);
   if (request->carry_count > 0) {
     api_json_key(out, "transferred");

@@ -160,6 +160,10 @@ void cli_print_supermesh(const cJSON *supermesh) {
   surface_of(supermesh, surface);
   printf("%s: %s vertices, %s triangles, %s, genus %.0f\n", cli_string(supermesh, "url", "?"), vertices, triangles,
          surface, cli_number(certificate, "genus"));
+  if (member(supermesh, "asset_triangles")) {
+    cli_count(cli_number(supermesh, "asset_triangles"), triangles);
+    printf("  the asset has %s triangles\n", triangles);
+  }
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
     percent(cli_number(shape, "hausdorff_relative"), error);
     percent(cli_number(shape, "rms_relative"), rms);

@@ -220,6 +220,8 @@ int access_has_room(const request *r, int64_t bytes, api_problem *problem);
 void reply_json(request *r, unsigned status, api_text *json); /* frees json */
 void reply_problem(request *r, api_problem *problem);         /* frees problem */
 void reply_refuse(request *r, const char *name, const char *format, ...) API_PRINTF(3, 4);
+/* Refuses the value of a query parameter, which the problem names. */
+void reply_bad_query(request *r, const char *parameter, const char *why);
 void reply_store(request *r, store_result result);
 void reply_empty(request *r, unsigned status);
 void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size); /* static bytes */

@@ -18,7 +18,7 @@ int64_t read_wait_ms(request *r) {
     wait = parse_preferred_ms(prefer[i]);
   }
   if (wait < 0) {
-    reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; values above 60 mean 60.");
+    reply_bad_query(r, "wait", "\"wait\" must be a number of seconds; values above 60 mean 60.");
   }
   r->preferred_ms = wait > 0 && !query ? wait : 0;
   return wait;
@@ -284,7 +284,7 @@ static void list_away(request *r) {
   list_page page;
   int64_t last = 0;
   if (state_text && (state = api_job_state_of_name(state_text)) < 0) {
-    reply_refuse(r, "bad-query", "\"state\" must be queued, running, succeeded, failed or cancelled.");
+    reply_bad_query(r, "state", "\"state\" must be queued, running, succeeded, failed or cancelled.");
     return;
   }
   if (!list_begin(r, "jobs", sizeof(job_row), &page)) {

@@ -161,6 +161,13 @@ void reply_refuse(request *r, const char *name, const char *format, ...) {
   reply_problem(r, &problem);
 }
 
+void reply_bad_query(request *r, const char *parameter, const char *why) {
+  api_problem problem = {0};
+  api_refuse(&problem, "bad-query", "%s", why);
+  api_json_member_string(&problem.facts, "parameter", parameter);
+  reply_problem(r, &problem);
+}
+
 void reply_job_problem(request *r, const char *json) {
   const char *at = strstr(json, "\"status\":");
   int status = 0;

@@ -70,18 +70,20 @@ enum MHD_Result handle_get(request *r) {
 
 /* Reads limit, page_token and id_prefix. 1, or 0 with a response. */
 static int read_page(request *r, list_page *page) {
-  const char *why = PARSE_PAGE_TOKEN, *token = query_of(r, "page_token");
+  const char *why = PARSE_PAGE_TOKEN, *token = query_of(r, "page_token"), *parameter;
   uint64_t sealed;
   page->prefix = query_of(r, "id_prefix");
   int fine = parse_page(query_of(r, "limit"), token, &page->limit, &sealed, &why);
   page->before = fine && token ? paging_open(r->srv->secret, sealed) : 0;
   fine &= !token || page->before > 0;
+  parameter = strcmp(why, PARSE_PAGE_TOKEN) == 0 ? "page_token" : "limit";
   if (fine && page->prefix && !parse_id_prefix(page->prefix)) {
     why = "\"id_prefix\" must be 1 to 64 lower-case hexadecimal digits.";
+    parameter = "id_prefix";
     fine = 0;
   }
   if (!fine) {
-    reply_refuse(r, "bad-query", "%s", why);
+    reply_bad_query(r, parameter, why);
   }
   return fine;
 }
@@ -123,19 +125,21 @@ void list_end(request *r, list_page *page, int64_t last, int count) {
 
 /* Reads the parameters of a list of supermeshes. 1, or 0 with a response. */
 static int read_filter(request *r, list_filter *filter, int *summary) {
-  const char *form = query_of(r, "view"), *why = NULL;
+  const char *form = query_of(r, "view"), *why = NULL, *parameter = "view";
   filter->mesh = query_of(r, "mesh");
   filter->name = query_of(r, "name");
   *summary = form && strcmp(form, "summary") == 0;
   if (form && !*summary && strcmp(form, "full") != 0) {
     why = "\"view\" must be full or summary.";
   } else if (filter->mesh && !api_id_valid(filter->mesh, strlen(filter->mesh))) {
+    parameter = "mesh";
     why = "\"mesh\" must be the id of a mesh, 64 lower-case hexadecimal digits.";
   } else if (filter->name && (strlen(filter->name) >= ORB_NAME_MAX || !*filter->name)) {
+    parameter = "name";
     why = "\"name\" must be the name of a shape, of 1 to 127 bytes.";
   }
   if (why) {
-    reply_refuse(r, "bad-query", "%s", why);
+    reply_bad_query(r, parameter, why);
   }
   return why == NULL;
 }

@@ -544,6 +544,8 @@ export type Supermesh = {
   }>;
   /** How many holes of the first shape are open in the asset. Only if there are any. The certificate is about the common mesh, in which they are filled. */
   open_holes?: number;
+  /** How many triangles the asset has. Only if that differs from `triangles`, the number of the common mesh: holes of the first shape are open in the asset, or a template keeps triangles that are not on the closed surface. */
+  asset_triangles?: number;
   /** Filled holes of the first shape and of a later one that correspond: the rims lie on each other. Only if there are any; `dropped` names the other holes. Holes are numbered from 1, in the order in which they were filled. */
   rims?: Array<{
     /** The later shape. */

@@ -258,4 +258,5 @@ export function assertProblem(reply, status, type, what = '') {
     assert.equal(typeof reply.json[member], 'string', text);
     assert.ok(reply.json[member].length > 0, text);
   }
+  if (type === 'bad-query') assert.equal(typeof reply.json.parameter, 'string', text);
 }

@@ -268,7 +268,10 @@ export function MorphInspector() {
         <tbody>
           <tr>
             <th scope="row">Common mesh</th>
-            <td>{count(supermesh.triangles)} triangles</td>
+            <td>
+              {count(supermesh.triangles)} triangles
+              {supermesh.asset_triangles ? `, ${count(supermesh.asset_triangles)} in the asset` : ''}
+            </td>
           </tr>
           <tr>
             <th scope="row">Closed, genus</th>
