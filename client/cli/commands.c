@@ -15,17 +15,14 @@
 
 int cli_run_upload(cli *c) {
   const char *name = c->args.value[OPT_NAME];
-  int rc = CLI_DONE;
   if (name && c->args.operand_count > 1) {
     cli_error(c, "--name needs exactly one file");
     return CLI_USAGE;
   }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
-    rc = cli_check_mesh(c, c->args.operands[i]);
-  }
+  int rc = cli_check_meshes(c);
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     cli_reply reply;
-    rc = cli_take_in(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
+    rc = cli_take_in(c, i, name, &reply);
     if (rc == CLI_DONE && !cli_ok(&reply)) {
       rc = cli_refused(c, c->args.operands[i], &reply);
     } else if (rc == CLI_DONE && c->json) {
@@ -51,7 +48,7 @@ static int embedding_request(cli *c, cJSON **out) {
   return cli_apply_sets(c, request);
 }
 
-static int embed_one(cli *c, const char *operand, const cJSON *settings) {
+static int embed_one(cli *c, int operand, const cJSON *settings) {
   cli_mesh mesh;
   cli_reply reply = {0};
   int rc = cli_mesh_of(c, operand, &mesh);
@@ -89,11 +86,11 @@ int cli_run_embed(cli *c) {
   if (rc == CLI_DONE) {
     rc = embedding_request(c, &settings);
   }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
-    rc = cli_check_mesh(c, c->args.operands[i]);
+  if (rc == CLI_DONE) {
+    rc = cli_check_meshes(c);
   }
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
-    rc = embed_one(c, c->args.operands[i], settings);
+    rc = embed_one(c, i, settings);
   }
   cJSON_Delete(settings);
   return rc;

@@ -71,7 +71,7 @@ static void zsh_command(const cli_command *command) {
     if (!(command->options & CLI_BIT(id))) {
       continue;
     }
-    printf(" \\\n        '%s--%s[", id == OPT_SET ? "*" : "", o->name);
+    printf(" \\\n        '%s--%s[", id == OPT_SET || id == OPT_TAKE_PART ? "*" : "", o->name);
     zsh_text(o->help);
     putchar(']');
     if (o->choices) {

@@ -169,7 +169,7 @@ static int add_shapes(cli *c, cJSON *request) {
   cJSON *shapes = cJSON_GetObjectItemCaseSensitive(request, "shapes");
   for (int i = 0; i < c->args.operand_count; i++) {
     cli_mesh mesh;
-    int rc = cli_mesh_of(c, c->args.operands[i], &mesh);
+    int rc = cli_mesh_of(c, i, &mesh);
     if (rc != CLI_DONE) {
       return rc;
     }
@@ -217,8 +217,8 @@ static int merge(cli *c, const char *output) {
   if (rc == CLI_DONE) {
     rc = make_request(c, &request);
   }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
-    rc = cli_check_mesh(c, c->args.operands[i]);
+  if (rc == CLI_DONE) {
+    rc = cli_check_meshes(c);
   }
   if (rc == CLI_DONE) {
     rc = ask_daemon(c, request);

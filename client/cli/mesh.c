@@ -1,6 +1,7 @@
 #include "mesh.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -34,12 +35,56 @@ static int check_handle_size(const cli *c) {
   return CLI_USAGE;
 }
 
-int cli_check_mesh(const cli *c, const char *operand) {
-  struct stat info;
-  int rc = check_handle_size(c);
-  if (rc != CLI_DONE) {
-    return rc;
+/* The file that a --take-part such as 1:Body is for, counted from 0, and the part; −1 if it is for all files. A number
+ * that no file has stays one, so that check_parts() refuses it. */
+static long file_of_part(const char *value, const char **part) {
+  const char *colon = strchr(value, ':');
+  char *number = colon ? cli_text("%.*s", (int)(colon - value), value) : NULL;
+  long file = -1;
+  if (!number || !cli_whole_number(number, 0, INT_MAX, &file)) {
+    file = -1;
   }
+  free(number);
+  *part = file < 0 ? value : colon + 1;
+  return file;
+}
+
+/* The part that the options name for an operand: the last one for this file, else the last one for all. */
+static const char *part_of(const cli *c, int operand) {
+  const char *all = NULL, *own = NULL;
+  for (int i = 0; i < c->args.part_count; i++) {
+    const char *part;
+    long file = file_of_part(c->args.parts[i], &part);
+    if (file == operand) {
+      own = part;
+    } else if (file < 0) {
+      all = part;
+    }
+  }
+  return own ? own : all;
+}
+
+static int check_parts(const cli *c) {
+  for (int i = 0; i < c->args.part_count; i++) {
+    const char *value = c->args.parts[i], *part;
+    long file = file_of_part(value, &part);
+    if (file >= c->args.operand_count) {
+      cli_error(
+          c, "--take-part %s is for file %ld, but the files are 0 to %d; a name that begins so goes to each file: 0:%s",
+          value, file, c->args.operand_count - 1, value);
+      return CLI_USAGE;
+    }
+    if (file >= 0 && is_stored(c->args.operands[file])) {
+      cli_error(c, "--take-part %s: %s is a mesh that the daemon has already; upload its file with the part", value,
+                c->args.operands[file]);
+      return CLI_USAGE;
+    }
+  }
+  return CLI_DONE;
+}
+
+static int check_mesh(const cli *c, const char *operand) {
+  struct stat info;
   if (is_stored(operand) || is_url(operand)) {
     return CLI_DONE;
   }
@@ -51,18 +96,26 @@ int cli_check_mesh(const cli *c, const char *operand) {
   return CLI_USAGE;
 }
 
-/* The parameters of repairs, ready to follow a query. */
-static char *repair_parameters(const cli *c) {
-  const char *size = c->args.value[OPT_HANDLE_SIZE], *part = c->args.value[OPT_TAKE_PART];
-  char *sizes = size ? cli_escape(size) : NULL, *parts = part ? cli_escape(part) : NULL;
-  char *text =
-      cli_text("%s%s%s%s", sizes ? "&handle_size=" : "", sizes ? sizes : "", parts ? "&part=" : "", parts ? parts : "");
-  free(sizes);
-  free(parts);
+int cli_check_meshes(const cli *c) {
+  int rc = check_handle_size(c);
+  if (rc == CLI_DONE) {
+    rc = check_parts(c);
+  }
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
+    rc = check_mesh(c, c->args.operands[i]);
+  }
+  return rc;
+}
+
+/* A parameter, ready to follow a query; empty without a value. */
+static char *parameter(const char *name, const char *value) {
+  char *escaped = value ? cli_escape(value) : NULL,
+       *text = escaped ? cli_text("&%s=%s", name, escaped) : cli_text("%s", "");
+  free(escaped);
   return text;
 }
 
-int cli_upload(cli *c, const char *path, const char *name, const char *repair, cli_reply *reply) {
+int cli_upload(cli *c, const char *path, const char *name, const cli_repairs *repairs, cli_reply *reply) {
   memset(reply, 0, sizeof *reply);
   FILE *file = fopen(path, "rb");
   struct stat info;
@@ -73,14 +126,10 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
     }
     return CLI_USAGE;
   }
-  char *base = cli_base_name(path), *escaped = cli_escape(name ? name : base), *target;
-  char *repairs = repair ? cli_escape(repair) : NULL;
-  const char *format = c->args.value[OPT_FORMAT];
-  char *kind = format ? cli_escape(format) : NULL;
-  char *more = repair_parameters(c);
-  target = cli_text("/v1/meshes?name=%s%s%s%s%s%s", escaped, repairs ? "&repair=" : "", repairs ? repairs : "",
-                    kind ? "&format=" : "", kind ? kind : "", more);
-  free(more);
+  char *base = cli_base_name(path), *escaped = cli_escape(name ? name : base);
+  char *repair = parameter("repair", repairs->list), *size = parameter("handle_size", repairs->handle_size);
+  char *part = parameter("part", repairs->part), *format = parameter("format", c->args.value[OPT_FORMAT]);
+  char *target = cli_text("/v1/meshes?name=%s%s%s%s%s", escaped, repair, format, size, part);
   char *label = cli_text("upload %s", base);
   cli_request request = {
       .method = "POST", .path = target, .upload = file, .upload_size = (curl_off_t)info.st_size, .label = label};
@@ -89,27 +138,29 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
   fclose(file);
   free(base);
   free(escaped);
-  free(repairs);
-  free(kind);
+  free(repair);
+  free(size);
+  free(part);
+  free(format);
   free(target);
   free(label);
   return rc;
 }
 
-static int fetch(cli *c, const char *url, const char *name, const char *repair, cli_reply *reply) {
+static int fetch(cli *c, const char *url, const char *name, const cli_repairs *repairs, cli_reply *reply) {
   const char *const members[][2] = {{"url", url},
                                     {"name", name},
-                                    {"repair", repair},
+                                    {"repair", repairs->list},
                                     {"format", c->args.value[OPT_FORMAT]},
-                                    {"part", c->args.value[OPT_TAKE_PART]}};
+                                    {"part", repairs->part}};
   cJSON *body = cJSON_CreateObject();
   for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
     if (members[i][1]) {
       cJSON_AddStringToObject(body, members[i][0], members[i][1]);
     }
   }
-  if (c->args.value[OPT_HANDLE_SIZE]) {
-    cJSON_AddNumberToObject(body, "handle_size", strtod(c->args.value[OPT_HANDLE_SIZE], NULL));
+  if (repairs->handle_size) {
+    cJSON_AddNumberToObject(body, "handle_size", strtod(repairs->handle_size, NULL));
   }
   char *text = cJSON_PrintUnformatted(body);
   cli_request request = {.method = "POST", .path = "/v1/meshes", .json = text};
@@ -122,9 +173,11 @@ static int fetch(cli *c, const char *url, const char *name, const char *repair, 
   return rc;
 }
 
-int cli_take_in(cli *c, const char *operand, const char *name, const char *repair, cli_reply *reply) {
+int cli_take_in(cli *c, int operand, const char *name, cli_reply *reply) {
+  const char *source = c->args.operands[operand];
+  cli_repairs repairs = {c->args.value[OPT_REPAIR], c->args.value[OPT_HANDLE_SIZE], part_of(c, operand)};
   memset(reply, 0, sizeof *reply);
-  return is_url(operand) ? fetch(c, operand, name, repair, reply) : cli_upload(c, operand, name, repair, reply);
+  return is_url(source) ? fetch(c, source, name, &repairs, reply) : cli_upload(c, source, name, &repairs, reply);
 }
 
 static void note_mesh(const cli *c, const char *operand, const cli_reply *reply) {
@@ -139,7 +192,8 @@ static void note_mesh(const cli *c, const char *operand, const cli_reply *reply)
   }
 }
 
-int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
+int cli_mesh_of(cli *c, int number, cli_mesh *out) {
+  const char *operand = c->args.operands[number];
   cli_reply reply = {0};
   int rc, known = is_stored(operand), named = known || is_url(operand);
   memset(out, 0, sizeof *out);
@@ -151,7 +205,7 @@ int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
     }
     free(path);
   } else {
-    rc = cli_take_in(c, operand, NULL, c->args.value[OPT_REPAIR], &reply);
+    rc = cli_take_in(c, number, NULL, &reply);
   }
   if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_refused(c, operand, &reply);

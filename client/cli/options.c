@@ -40,7 +40,8 @@ const cli_option cli_options[OPT_COUNT] = {
                     "allowed repairs, separated by commas"},
     [OPT_HANDLE_SIZE] = {"handle-size", 0, "X", NULL,
                          "longest loop that close_handles cuts along, as a fraction of the diagonal; default: 0.05"},
-    [OPT_TAKE_PART] = {"take-part", 0, "PART", NULL, "keep this piece: a number from 0 by size, or a name"},
+    [OPT_TAKE_PART] = {"take-part", 0, "PART", NULL,
+                       "keep this piece: a number from 0 by size, or a name; N:PART is for file N only, from 0"},
     [OPT_FORMAT] = {"format", 0, "FORMAT", "obj off ply stl 3mf gltf glb",
                     "file format; default: detected from the content"},
     [OPT_METHOD] = {"method", 0, "METHOD", "newton kernel-sampling", "embedding method"},
@@ -121,6 +122,13 @@ static int check_choice(const cli_command *command, int id, const char *value) {
 }
 
 static int store(cli_args *out, int id, const char *value) {
+  if (id == OPT_TAKE_PART) {
+    out->parts = realloc(out->parts, (size_t)(out->part_count + 1) * sizeof(char *));
+    if (!out->parts) {
+      exit(CLI_REFUSED);
+    }
+    out->parts[out->part_count++] = value;
+  }
   if (id != OPT_SET) {
     out->value[id] = value;
     return 1;
@@ -218,6 +226,7 @@ void cli_args_free(cli_args *args) {
     free(args->operands[i]);
   }
   free(args->operands);
+  free(args->parts);
   memset(args, 0, sizeof *args);
 }
 

@@ -86,6 +86,8 @@ typedef struct cli_args {
   const char *value[OPT_COUNT]; /* NULL: not given; a switch: "" */
   const char *sets[CLI_SETS_MAX];
   int set_count;
+  const char **parts; /* every --take-part */
+  int part_count;
   char **operands;
   int operand_count;
 } cli_args;

@@ -93,7 +93,7 @@ static int upload_all(cli *c, char **fragment) {
   *fragment = cli_text("%s", "");
   for (int i = 0; i < c->args.operand_count; i++) {
     cli_mesh mesh;
-    int rc = cli_mesh_of(c, c->args.operands[i], &mesh);
+    int rc = cli_mesh_of(c, i, &mesh);
     if (rc != CLI_DONE) {
       return rc;
     }
@@ -152,11 +152,9 @@ static int serve(cli *c, pid_t daemon, char *address) {
 }
 
 int cli_run_studio(cli *c) {
-  for (int i = 0; i < c->args.operand_count; i++) {
-    int rc = cli_check_mesh(c, c->args.operands[i]);
-    if (rc != CLI_DONE) {
-      return rc;
-    }
+  int rc = cli_check_meshes(c);
+  if (rc != CLI_DONE) {
+    return rc;
   }
   FILE *out = NULL;
   struct sigaction action = {.sa_handler = on_end}; /* interrupts waitpid() */
@@ -166,7 +164,7 @@ int cli_run_studio(cli *c) {
   char *data = data_folder(c);
   pid_t daemon = start(data, &out);
   char *address = out ? address_of(out) : NULL;
-  int rc = CLI_UNREACHABLE;
+  rc = CLI_UNREACHABLE;
   if (address) {
     rc = serve(c, daemon, address);
   } else {

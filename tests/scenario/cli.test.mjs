@@ -567,6 +567,96 @@ test('doctor says what a repair would leave, and calls none helpful that takes m
   assert.match(other.out, /32 triangles\n {2}repaired: part \(1\)/);
 });
 
+test('doctor lists the faults behind the first, and the size of handles that closes them', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const [mess, rest, fan] = ['mess', 'rest', 'fan'].map((name) => path.join(at, `${name}.obj`));
+  await writeFile(mess, shapes.obj(shapes.apart(shapes.withoutFace(shapes.torus(24, 12)), shapes.ball(1))));
+  await writeFile(rest, shapes.obj(shapes.apart(shapes.torus(24, 12), shapes.withoutFace(shapes.ball(1)))));
+  await writeFile(fan, 'v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n');
+
+  const sick = await run(['doctor', mess], { env });
+  assert.equal(sick.code, 1);
+  assert.match(sick.err, /not-closed: .* 3 edges in 1 boundary loop/);
+  assert.match(
+    sick.out,
+    /with --repair fill_holes: not-connected: .*\n {2}part 0: 576 triangles.*\n {2}part 1: 32 triangles/,
+  );
+  assert.match(
+    sick.out,
+    /with --repair largest_component,fill_holes: not-genus-zero: .*\n {2}handle: a loop of 12 vertices/,
+  );
+  const cure = sick.out.match(/helps: orbmorph (upload --repair \S+ --handle-size [\d.]+) /);
+  assert.ok(cure, sick.out);
+  assert.match(cure[1], /largest_component,fill_holes,close_handles/);
+  // The tube of the torus is a ring of regular polygons of 12 corners: a cut adds two of them.
+  const { positions } = shapes.torus(24, 12);
+  const ring = positions.slice(0, 12);
+  const centre = [0, 1, 2].map((k) => ring.reduce((sum, p) => sum + p[k], 0) / 12);
+  const radius = Math.hypot(...ring[0].map((x, k) => x - centre[k]));
+  const patches = 2 * 6 * radius ** 2 * Math.sin(Math.PI / 6);
+  const left = await run([...cure[1].split(' '), mess, '--json'], { env });
+  assert.equal(left.code, 0, left.err);
+  const mesh = JSON.parse(left.out);
+  const said = Number(sick.out.match(/patches over the handles are ([\d.]+) % of the area/)[1]);
+  assert.ok(Math.abs(said / 100 / (patches / mesh.area) - 1) < 0.06, `${said} %, ${patches / mesh.area}`);
+  assert.match(sick.out, new RegExp(`left: ${mesh.triangles} triangles; the file has 607`));
+
+  const spared = await run(['doctor', rest], { env });
+  assert.match(
+    spared.out,
+    /helps: orbmorph upload --repair largest_component,close_handles --handle-size/,
+    'the hole is on the piece that is left out',
+  );
+
+  const open = await run(['doctor', fan], { env });
+  assert.match(open.out, /split_nonmanifold: not-closed: .*\n {2}open edges: \[\d,\d\]/);
+  assert.match(open.out, /None of the daemon's repairs fixes this mesh/);
+  assert.doesNotMatch(open.out, /helps/);
+  assert.equal((await run(['ls', '-q'], { env })).out.includes('rest'), false, 'doctor deletes all that it uploaded');
+});
+
+test('a part may be taken of one file only', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const [a, b] = ['a', 'b'].map((name) => path.join(at, `${name}.obj`));
+  const named = (...objects) => {
+    let first = 1;
+    return objects
+      .map(([name, { positions, triangles }], i) => {
+        const text = `o ${name}\n${positions.map(([x, y, z]) => `v ${x + 10 * i} ${y} ${z}\n`).join('')}${triangles
+          .map((f) => `f ${f.map((v) => v + first).join(' ')}\n`)
+          .join('')}`;
+        first += positions.length;
+        return text;
+      })
+      .join('');
+  };
+  await writeFile(a, named(['Body', shapes.ball(3)], ['Eye', shapes.ball(1)], ['1:Tail', shapes.ball(2)]));
+  await writeFile(b, named(['Torso', shapes.ball(2)], ['Head', shapes.ball(1)]));
+  const triangles = async (...args) => {
+    const { code, out, err } = await run(['upload', '--json', ...args], { env });
+    return code
+      ? err
+      : out
+          .trim()
+          .split('\n')
+          .map((line) => JSON.parse(line).triangles);
+  };
+  assert.deepEqual(await triangles(a, b, '--take-part', '1'), [128, 32], 'the plain form is for all files');
+  assert.deepEqual(await triangles(a, b, '--take-part', '0:Eye', '--take-part=1:Head'), [32, 32]);
+  assert.deepEqual(await triangles(a, b, '--take-part', '0', '--take-part', '1:1'), [512, 32], 'else the plain one');
+  assert.deepEqual(await triangles(a, '--take-part', '0:1:Tail'), [128], 'a name with a number and a colon');
+  assert.match(await triangles(a, '--take-part', '1:Tail'), /is for file 1, but the files are 0 to 0/);
+  assert.match(await triangles(a, b, '--take-part', '0', '--take-part', '1:Eye'), /no part of the name \\"Eye\\"/);
+  const { json } = await d.upload(shapes.obj(shapes.egg(2)));
+  const stored = await run(['merge', a, json.id, '--take-part', '1:0'], { env });
+  assert.equal(stored.code, 2);
+  assert.match(stored.err, /is a mesh that the daemon has already/);
+});
+
 test('doctor splits edges of three faces', async (t) => {
   const d = await daemon(t);
   const wall = path.join(await folder(t), 'wall.obj');
