@@ -5,8 +5,11 @@
 #ifndef ORB_STORE_VERIFY_H
 #define ORB_STORE_VERIFY_H
 
+#include "api/ids.h"
 #include "store/objects.h"
 
+/* The hash of a file, which is read in parts, so that the memory does not depend on its size. 0: it cannot be read. */
+int verify_hash(int fd, char sha[API_ID_SIZE]);
 /* Whether the object has been verified since the start. Does not block. */
 int verify_is_done(const objects *store, object_kind kind, const char *id);
 /* Verifies an object unless that has been done. sha: of its row; "" if the row has none; not used for aligned spheres,

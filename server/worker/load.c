@@ -2,6 +2,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include "store/verify.h"
 #include "worker/run.h"
@@ -35,6 +37,49 @@ static int load_verified(const run_env *env, object_kind kind, const char *id, c
   *bytes = NULL;
   verify_again(env->store, kind, id, sha); /* within a process of its own, the daemon does this: worker/isolated.c */
   return 0;
+}
+
+/* An uploaded file. It may have any size, however few its triangles, so a large one is not copied into memory, which
+ * the job's budget would not know of: its pages can be dropped. */
+typedef struct mesh_file {
+  unsigned char *bytes;
+  size_t size;
+  int is_mapped;
+} mesh_file;
+
+enum { MAPPED_BYTES = 1 << 20 }; /* a smaller file is read in less time than it is mapped */
+
+static void close_mesh_file(mesh_file *file) {
+  if (file->is_mapped) {
+    munmap(file->bytes, file->size);
+  } else {
+    free(file->bytes);
+  }
+}
+
+/* Opens a mesh whose bytes have this hash. A large file is read for its hash before it is mapped, so a disk that fails
+ * shows as a damaged mesh. */
+static int open_mesh_file(const run_env *env, const char *id, const char *sha, mesh_file *file) {
+  char found[API_ID_SIZE];
+  int fd;
+  uint64_t size;
+  *file = (mesh_file){0};
+  if (objects_read(env->store, OBJECT_MESH, id, &fd, &size) != STORE_OK) {
+    return 0;
+  }
+  if (size <= MAPPED_BYTES) {
+    close(fd);
+    return load_verified(env, OBJECT_MESH, id, sha, &file->bytes, &file->size);
+  }
+  const int matches = verify_hash(fd, found) && strcmp(found, sha) == 0;
+  void *at = matches ? mmap(NULL, size, PROT_READ, MAP_PRIVATE, fd, 0) : MAP_FAILED;
+  close(fd);
+  if (!matches) {
+    verify_again(env->store, OBJECT_MESH, id, sha);
+  } else if (at != MAP_FAILED) {
+    *file = (mesh_file){at, size, 1};
+  }
+  return file->is_mapped;
 }
 
 static void note_triangles(const orb_mesh *raw, file_triangle *noted, int32_t count) {
@@ -83,8 +128,7 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   api_mesh_summary summary;
   orb_repair_options repair;
   char canonical[API_REPAIR_TEXT];
-  unsigned char *bytes = NULL;
-  size_t size;
+  mesh_file file;
   memset(mesh, 0, sizeof *mesh);
   store_result found = run_get(env, RESOURCE_MESH, id, &row);
   if (found == STORE_NOT_FOUND) {
@@ -92,17 +136,17 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   }
   int fine = found == STORE_OK && api_mesh_summarise(row.json, &summary) &&
              api_repair_parse(summary.repair, NULL, NULL, &repair, canonical, problem);
-  fine = fine && load_verified(env, OBJECT_MESH, id, row.sha, &bytes, &size);
+  fine = fine && open_mesh_file(env, id, row.sha, &file);
   resource_free(&row);
   if (!fine) {
     return api_refuse(problem, "corrupt", "The stored mesh %s cannot be read or was altered; upload it again.", id);
   }
   orb_format format = orb_format_of_name(summary.format);
-  orb_status status = orb_mesh_read(ctx, bytes, size, format, mesh, NULL);
+  orb_status status = orb_mesh_read(ctx, file.bytes, file.size, format, mesh, NULL);
   if (status == ORB_OK && raw) {
-    status = copy_file(ctx, mesh, format, bytes, size, raw);
+    status = copy_file(ctx, mesh, format, file.bytes, file.size, raw);
   }
-  free(bytes);
+  close_mesh_file(&file);
   if (status == ORB_OK) {
     note_triangles(mesh, noted, noted_count);
     if (corners && !(*corners = copy_corners(ctx, mesh))) {

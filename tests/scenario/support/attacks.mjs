@@ -1,4 +1,5 @@
 // Files that are made to cost much: small, but expensive for a reader without bounds (docs/limits.md).
+import { randomBytes } from 'node:crypto';
 
 const MASK = (1n << 64n) - 1n;
 /** The inverse of an odd number modulo 2^64. */
@@ -128,4 +129,10 @@ export function sharedIndices(indices = 2 << 20, primitives = 2000) {
 export function hugePolygon(corners = 5_000_000) {
   const star = 'v 3 0 0\nv 1 1 0\nv 0 3 0\nv -1 1 0\nv -3 0 0\nv -1 -1 0\nv 0 -3 0\nv 1 -1 0\nf';
   return Buffer.from(`${star}${' 1 2 3 4 5 6 7 8'.repeat(corners / 8)}\n`);
+}
+
+/** An OBJ file with so many megabytes of comments, which compress well, but not beyond max-ratio. */
+export function padded(megabytes, obj) {
+  const line = () => `# ${randomBytes(64).toString('hex')}${'x'.repeat(16_253)}\n`;
+  return Buffer.from(obj + Array.from({ length: 64 * megabytes }, line).join(''));
 }

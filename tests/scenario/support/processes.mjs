@@ -19,13 +19,17 @@ export function children(pid) {
 /** The processes that check meshes and run jobs. */
 export const workers = (d) => children(d.child.pid).flatMap(children);
 
-/** Resident megabytes of the daemon and all its processes; shared memory counts once. */
-export function megabytes(d) {
+/** Megabytes of the daemon and all its processes; what they share counts once. what: all that is resident (''), or
+ * parts of that: anonymous memory ('_Anon'), memory as files ('_Shmem'). The rest is pages of files. */
+export function megabytes(d, ...what) {
   let kilobytes = 0;
   const forks = children(d.child.pid);
   for (const pid of [d.child.pid, ...forks, ...forks.flatMap(children)]) {
     try {
-      kilobytes += Number(/^Pss:\s+(\d+)/m.exec(readFileSync(`/proc/${pid}/smaps_rollup`, 'latin1'))[1]);
+      const usage = readFileSync(`/proc/${pid}/smaps_rollup`, 'latin1');
+      for (const each of what.length ? what : ['']) {
+        kilobytes += Number(new RegExp(`^Pss${each}:\\s+(\\d+)`, 'm').exec(usage)[1]);
+      }
     } catch {
       // it has ended
     }
