@@ -1,9 +1,14 @@
 /* Parallel loops on the context's own threads.
  *
- * One loop runs at a time; the caller takes part as thread 0. One atomic word, the ticket, holds the number of the loop
- * and its next chunk. A thread claims a chunk by raising the ticket, so it cannot take part in a loop that has no chunk
- * left, and the caller waits for claimed chunks only: a thread that has not begun one delays nobody, however late a
- * busy machine runs it. No lock is taken on the way, except to sleep and to wake a sleeper.
+ * One loop runs at a time; the caller takes part as thread 0. Each thread has a range of the chunks, so the next loop
+ * over the same data finds most of it in the thread's own cache: the sweeps of a map took two to four times their
+ * processor time on two threads when chunks went to whoever came first. A thread that is done with its range helps with
+ * the others.
+ *
+ * An atomic word for each range, the ticket, holds the number of the loop and the next chunk. A thread claims a chunk
+ * by raising the ticket, so it cannot take part in a loop that has no chunk left, and the caller waits for claimed
+ * chunks only: a thread that has not begun one delays nobody, however late a busy machine runs it. No lock is taken on
+ * the way, except to sleep and to wake a sleeper.
  *
  * The pool shares a loop only if that is likely to pay. It remembers how long an iteration of each body took. A loop
  * that should end sooner than it takes to wake a thread runs in the caller, which watches the clock and shares the rest
@@ -55,9 +60,13 @@ struct orb_pool {
   int spins;           /* of the caller, before it sleeps */
   atomic_int sleepers; /* workers that wait to be woken; written under the lock */
   loop_cost cost[COSTS];
-  char apart_from_ticket[CACHE_LINE];
-  atomic_ullong ticket; /* number of the loop << 32 | next chunk, or CLOSED */
-  /* The loop. Written while the ticket is closed; what is read before a ticket is raised belongs to that ticket. */
+  char apart_from_range[CACHE_LINE];
+  struct range {
+    atomic_ullong ticket; /* number of the loop << 32 | next chunk, or CLOSED */
+    atomic_uint end;      /* of the chunks of the range */
+    char apart[CACHE_LINE - sizeof(atomic_ullong) - sizeof(atomic_uint)];
+  } range[MAX_WORKERS + 1]; /* one for each thread */
+  /* The loop. Written while the tickets are closed; what is read before a ticket is raised belongs to that ticket. */
   _Atomic(orb_loop_fn) body;
   _Atomic(void *) arg;
   atomic_llong start, count, grain;
@@ -84,26 +93,40 @@ static void run_chunk(const parallel_loop *loop, uint32_t chunk, int thread) {
   loop->body(loop->arg, loop->start + begin, loop->start + end, thread);
 }
 
-/* Claims chunk *chunk of *loop; 0 where none is left. *number: of the loop that was looked at. */
-static int claim(struct orb_pool *pool, parallel_loop *loop, uint32_t *chunk, uint32_t *number) {
-  unsigned long long ticket = atomic_load_explicit(&pool->ticket, memory_order_acquire);
+/* Claims chunk *chunk of *loop from a range; 0 where none is left. */
+static int claim_of(struct orb_pool *pool, struct range *range, parallel_loop *loop, uint32_t *chunk) {
+  unsigned long long ticket = atomic_load_explicit(&range->ticket, memory_order_acquire);
   for (;;) {
-    *number = loop_of(ticket);
     *chunk = chunk_of(ticket);
-    loop->chunks = atomic_load_explicit(&pool->chunks, memory_order_acquire);
-    if (*chunk >= loop->chunks) {
+    if (*chunk >= atomic_load_explicit(&range->end, memory_order_acquire)) {
       return 0;
     }
+    loop->chunks = atomic_load_explicit(&pool->chunks, memory_order_acquire);
     loop->body = atomic_load_explicit(&pool->body, memory_order_acquire);
     loop->arg = atomic_load_explicit(&pool->arg, memory_order_acquire);
     loop->start = atomic_load_explicit(&pool->start, memory_order_acquire);
     loop->count = atomic_load_explicit(&pool->count, memory_order_acquire);
     loop->grain = atomic_load_explicit(&pool->grain, memory_order_acquire);
-    if (atomic_compare_exchange_weak_explicit(&pool->ticket, &ticket, ticket + 1, memory_order_acq_rel,
+    if (atomic_compare_exchange_weak_explicit(&range->ticket, &ticket, ticket + 1, memory_order_acq_rel,
                                               memory_order_acquire)) {
       return 1;
     }
   }
+}
+
+/* Claims a chunk of the thread's own range, or of the next one that has any; 0 where none is left. */
+static int claim(struct orb_pool *pool, int thread, parallel_loop *loop, uint32_t *chunk) {
+  for (int i = 0, at = thread; i <= pool->workers; i++, at = at < pool->workers ? at + 1 : 0) {
+    if (claim_of(pool, &pool->range[at], loop, chunk)) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
+/* The number of the loop that was handed out last. Its ranges are open before the number shows. */
+static uint32_t newest_loop(struct orb_pool *pool) {
+  return loop_of(atomic_load_explicit(&pool->range[0].ticket, memory_order_acquire));
 }
 
 static void pause_cpu(void) {
@@ -131,7 +154,7 @@ static void finish_chunk(struct orb_pool *pool) {
 /* Waits for a loop of another number; 0 where the pool stops instead. */
 static int next_loop(struct orb_pool *pool, uint32_t number, int *spins) {
   for (int i = 0; i < *spins; i++) {
-    if (loop_of(atomic_load_explicit(&pool->ticket, memory_order_acquire)) != number) {
+    if (newest_loop(pool) != number) {
       *spins = adapted(*spins, 1);
       return 1;
     }
@@ -140,7 +163,7 @@ static int next_loop(struct orb_pool *pool, uint32_t number, int *spins) {
   *spins = adapted(*spins, 0);
   pthread_mutex_lock(&pool->lock);
   atomic_fetch_add(&pool->sleepers, 1);
-  while (!pool->stopping && loop_of(atomic_load(&pool->ticket)) == number) {
+  while (!pool->stopping && loop_of(atomic_load(&pool->range[0].ticket)) == number) {
     pthread_cond_wait(&pool->wake, &pool->lock);
   }
   atomic_fetch_sub(&pool->sleepers, 1);
@@ -156,7 +179,8 @@ static void *worker_main(void *argument) {
   uint32_t chunk, number;
   do {
     parallel_loop loop;
-    while (claim(pool, &loop, &chunk, &number)) {
+    number = newest_loop(pool);
+    while (claim(pool, self->index, &loop, &chunk)) {
       run_chunk(&loop, chunk, self->index);
       finish_chunk(pool);
     }
@@ -174,7 +198,9 @@ static struct orb_pool *pool_start(orb_context *ctx) {
   pthread_cond_init(&pool->wake, NULL);
   pthread_cond_init(&pool->done, NULL);
   pool->spins = SPINS_MOST;
-  atomic_store(&pool->ticket, (uint32_t)CLOSED);
+  for (int i = 0; i <= MAX_WORKERS; i++) {
+    atomic_store(&pool->range[i].ticket, (uint32_t)CLOSED);
+  }
   atomic_store(&pool->wanted, UINT32_MAX);
   ctx->pool = pool;
   for (int i = 0; i < ctx->options.threads - 1 && i < MAX_WORKERS; i++) {
@@ -261,10 +287,16 @@ static void hand_out(struct orb_pool *pool, const parallel_loop *loop, uint32_t 
   atomic_store_explicit(&pool->grain, loop->grain, memory_order_release);
   atomic_store_explicit(&pool->chunks, loop->chunks, memory_order_release);
   atomic_store_explicit(&pool->finished, 0, memory_order_release);
-  unsigned long long number = loop_of(atomic_load_explicit(&pool->ticket, memory_order_relaxed)) + 1ULL;
-  atomic_store(&pool->ticket, number << 32 | first);
+  unsigned long long number = newest_loop(pool) + 1ULL;
+  uint32_t threads = (uint32_t)pool->workers + 1;
+  for (uint32_t i = threads; i-- > 0;) { /* the range that shows the number comes last */
+    uint64_t left = loop->chunks;        /* ranges of all chunks: those of `first` and before are the caller's */
+    uint32_t begin = (uint32_t)(left * i / threads), end = (uint32_t)(left * (i + 1) / threads);
+    atomic_store_explicit(&pool->range[i].end, end, memory_order_release);
+    atomic_store(&pool->range[i].ticket, number << 32 | (begin < first ? first : begin));
+  }
   if (atomic_load(&pool->sleepers) > 0) {
-    pthread_mutex_lock(&pool->lock); /* until a thread that has looked at the old ticket sleeps */
+    pthread_mutex_lock(&pool->lock); /* until a thread that has looked at the old number sleeps */
     uint32_t sleepers = (uint32_t)atomic_load(&pool->sleepers), useful = loop->chunks - first - 1;
     pthread_mutex_unlock(&pool->lock);
     for (uint32_t i = 0; i < sleepers && i < useful; i++) {
@@ -297,16 +329,18 @@ static void await(struct orb_pool *pool, uint32_t finished) {
 /* Shares the loop from chunk `first` on, and returns when all are done. */
 static void run_shared(struct orb_pool *pool, const parallel_loop *loop, uint32_t first, loop_cost *cost) {
   double start = orb_clock();
-  uint32_t own = 0, chunk, number;
+  uint32_t own = 0, chunk;
   hand_out(pool, loop, first);
-  for (parallel_loop claimed; claim(pool, &claimed, &chunk, &number); own++) {
+  for (parallel_loop claimed; claim(pool, 0, &claimed, &chunk); own++) {
     run_chunk(&claimed, chunk, 0);
   }
   if (own > 0) {
     learn(cost, (orb_clock() - start) / (double)(own * loop->grain));
   }
   await(pool, loop->chunks - first - own);
-  atomic_store(&pool->ticket, (unsigned long long)number << 32 | (uint32_t)CLOSED);
+  for (int i = 0; i <= pool->workers; i++) {
+    atomic_store(&pool->range[i].ticket, (unsigned long long)newest_loop(pool) << 32 | (uint32_t)CLOSED);
+  }
 }
 
 void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
