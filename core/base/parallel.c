@@ -71,6 +71,7 @@ struct orb_pool {
   _Atomic(void *) arg;
   atomic_llong start, count, grain;
   atomic_uint chunks;
+  atomic_int ranges; /* as many as threads; 0 until a loop is handed out */
   char apart_from_finished[CACHE_LINE];
   atomic_uint finished; /* chunks of this loop that workers have run */
   atomic_uint wanted;   /* the caller sleeps until this many are finished; UINT32_MAX: it does not sleep */
@@ -116,7 +117,8 @@ static int claim_of(struct orb_pool *pool, struct range *range, parallel_loop *l
 
 /* Claims a chunk of the thread's own range, or of the next one that has any; 0 where none is left. */
 static int claim(struct orb_pool *pool, int thread, parallel_loop *loop, uint32_t *chunk) {
-  for (int i = 0, at = thread; i <= pool->workers; i++, at = at < pool->workers ? at + 1 : 0) {
+  const int ranges = atomic_load_explicit(&pool->ranges, memory_order_acquire);
+  for (int i = 0, at = thread; i < ranges; i++, at = at + 1 < ranges ? at + 1 : 0) {
     if (claim_of(pool, &pool->range[at], loop, chunk)) {
       return 1;
     }
@@ -289,6 +291,7 @@ static void hand_out(struct orb_pool *pool, const parallel_loop *loop, uint32_t 
   atomic_store_explicit(&pool->finished, 0, memory_order_release);
   unsigned long long number = newest_loop(pool) + 1ULL;
   uint32_t threads = (uint32_t)pool->workers + 1;
+  atomic_store_explicit(&pool->ranges, (int)threads, memory_order_release);
   for (uint32_t i = threads; i-- > 0;) { /* the range that shows the number comes last */
     uint64_t left = loop->chunks;        /* ranges of all chunks: those of `first` and before are the caller's */
     uint32_t begin = (uint32_t)(left * i / threads), end = (uint32_t)(left * (i + 1) / threads);
