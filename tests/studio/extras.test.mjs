@@ -5,6 +5,8 @@ import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { rigged } from '../samples/rigged.mjs';
+import { parseGlb } from '../scenario/support/glb.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { writePng } from '../scenario/support/png.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
@@ -66,7 +68,7 @@ test('a skin, targets and a texture of the second shape are taken by a tick each
     file('bean.glb', painted(bean, [230, 30, 20], { moves, edit: skinned(bean.positions.length) })),
     file('plain.obj', Buffer.from(obj(ball(2))), 'text/plain'),
   );
-  const offers = page.getByRole('group', { name: 'From the other shapes' });
+  const offers = page.getByRole('group', { name: 'Besides the surfaces' });
   assert.deepEqual(await offers.locator('label').allInnerTexts(), [
     'Take the skin of bean',
     'Take the texture coordinates of bean',
@@ -127,7 +129,119 @@ test('a skin, targets and a texture of the second shape are taken by a tick each
     'Take the texture of bean, as a second look',
   ]);
   await button(page, 'Remove egg').click();
-  assert.equal(await offers.count(), 0, 'the first shape gives its own');
+  assert.deepEqual(
+    await offers.locator('label').allInnerTexts(),
+    ['Keep the skin of bean', 'Keep the morph targets of bean'],
+    'the first shape gives its own materials',
+  );
+  await done();
+});
+
+test('the size of baked pictures is chosen, and is in the URL', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const file = (name, buffer) => ({ name, mimeType: 'model/gltf-binary', buffer });
+  const [egg, bean] = [ball(2, ([x, y, z]) => [x, 1.3 * y, z]), ball(2, ([x, y, z]) => [x + 0.3 * y * y, y, z])];
+  await addFiles(page, file('egg.glb', painted(egg, [20, 40, 230])), file('bean.glb', painted(bean, [230, 30, 20])));
+  const size = page.getByLabel('Size of the pictures');
+  assert.equal(await size.count(), 0, 'no picture is taken yet');
+  await page.getByLabel('Take the texture of bean, as a second look').check();
+  await size.selectOption('512');
+  await until(() => /[#&]o=[^&]*,512(&|$)/.test(page.url()), 'URL');
+  await page.reload();
+  await page.locator('.card.ready').nth(1).waitFor();
+  assert.equal(await size.inputValue(), '512');
+  await button(page, 'Morph 2 shapes').click();
+  await defaultShown(page);
+  const [id] = (await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href')).match(/[0-9a-f]{64}/);
+  const { request, transferred } = await json(daemon.url, `/v1/supermeshes/${id}`);
+  assert.deepEqual(request.transfer, [{ from: 1, what: 'texture', resolution: 512 }]);
+  assert.equal(transferred[0].resolution, 512);
+  const glb = Buffer.from(await (await fetch(`${daemon.url}/v1/supermeshes/${id}/asset.glb`)).arrayBuffer());
+  const { gltf } = parseGlb(glb);
+  const start = 28 + glb.readUInt32LE(12);
+  const widths = gltf.images.map(({ bufferView }) => {
+    const { byteOffset = 0 } = gltf.bufferViews[bufferView];
+    return glb.readUInt32BE(start + byteOffset + 16); // IHDR of a PNG
+  });
+  assert.ok(widths.includes(512), `${widths}`);
+  await done();
+});
+
+test('a new mesh keeps the skin and the targets of the first shape on request', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const egg = ball(2, ([x, y, z]) => [x, 1.2 * y, z]);
+  const moves = egg.positions.map(([, y]) => [0, y > 0 ? 0.1 : 0, 0]);
+  const glb = painted(egg, [20, 40, 230], { moves, edit: skinned(egg.positions.length) });
+  await addFiles(
+    page,
+    { name: 'egg.glb', mimeType: 'model/gltf-binary', buffer: glb },
+    {
+      name: 'bean.obj',
+      mimeType: 'text/plain',
+      buffer: Buffer.from(obj(ball(2, ([x, y, z]) => [x + 0.3 * y * y, y, z]))),
+    },
+  );
+  const offers = page.getByRole('group', { name: 'Besides the surfaces' });
+  const keep = page.getByRole('switch', { name: 'Keep the mesh of egg' });
+  await keep.click();
+  assert.equal(await offers.count(), 0, 'a kept mesh has everything');
+  await keep.click();
+  assert.deepEqual(await offers.locator('label').allInnerTexts(), [
+    'Keep the skin of egg',
+    'Keep the morph targets of egg',
+  ]);
+  await offers.getByLabel('Keep the skin of egg').check();
+  await offers.getByLabel('Keep the morph targets of egg').check();
+  await until(() => /[#&]x=0:skin,0:targets(&|$)/.test(page.url()), 'URL');
+  await button(page, 'Morph 2 shapes').click();
+  await defaultShown(page);
+  const [id] = (await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href')).match(/[0-9a-f]{64}/);
+  const { transferred, dropped } = await json(daemon.url, `/v1/supermeshes/${id}`);
+  assert.deepEqual(
+    transferred.map(({ from, what }) => `${from}:${what}`),
+    ['0:skin', '0:targets'],
+  );
+  assert.deepEqual(dropped, [], 'the asset has all that the files have');
+  await done();
+});
+
+test('the parts of a kept document that are its surface are named, and no others move', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const { bytes } = rigged();
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles([
+      { name: 'body.glb', mimeType: 'model/gltf-binary', buffer: bytes },
+      { name: 'ball.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(ball(3, ([x, y, z]) => [x, 2 * y, z]))) },
+    ]);
+  await button(page, 'Keep the largest piece').click();
+  await page.locator('.card.ready').nth(1).waitFor();
+  const meshes = page.getByRole('group', { name: 'Meshes of the closed surface' });
+  assert.equal(await meshes.count(), 0, 'a new mesh has no parts');
+  await page.getByRole('switch', { name: 'Keep the mesh of body' }).click();
+  await page.getByText('The closed surface: what was uploaded').click();
+  const names = parseGlb(bytes).gltf.meshes.map(({ name }, i) => `Mesh ${i}, “${name}”`);
+  assert.deepEqual(await meshes.locator('label').allInnerTexts(), names);
+  const [wrong, right] = [names.findIndex((n) => /eye/.test(n)), names.findIndex((n) => /Body/.test(n))];
+
+  await meshes.getByRole('checkbox').nth(wrong).check();
+  await button(page, 'Morph 2 shapes').click();
+  const alert = page.getByRole('alert');
+  await alert.waitFor();
+  assert.match(await alert.innerText(), /surface/, 'the eyes are no part of the surface');
+  await page.getByText('The closed surface: 1 named part').waitFor();
+  await meshes.getByRole('checkbox').nth(wrong).uncheck();
+  await meshes.getByRole('checkbox').nth(right).check();
+  await until(() => decodeURIComponent(page.url()).includes(`&s={"meshes":[${right}]}`), 'URL');
+  await page.reload();
+  await page.getByText('The closed surface: 1 named part').click();
+  assert.equal(await meshes.getByRole('checkbox').nth(right).isChecked(), true);
+  await button(page, 'Morph 2 shapes').click();
+  await defaultShown(page);
+  const [id] = (await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href')).match(/[0-9a-f]{64}/);
+  const { request } = await json(daemon.url, `/v1/supermeshes/${id}`);
+  assert.deepEqual(request.template, { meshes: [right], nodes: [] });
   await done();
 });
 

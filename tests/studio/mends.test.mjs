@@ -3,7 +3,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { rigged } from '../samples/rigged.mjs';
-import { ball, grating, obj, torus } from '../scenario/support/shapes.mjs';
+import { apart, ball, grating, obj, torus } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { countPixels } from './pictures.mjs';
 import { button, defaultShown, json, openPage, sample, settled, until } from './support.mjs';
@@ -146,6 +146,29 @@ test('pieces of one name are told apart, and each can be kept', async () => {
   await button(page, 'Keep “eye”, piece 2 (4 triangles)').click();
   const mesh = await mended(page, 'body');
   assert.equal(mesh.triangles, 4);
+  await done();
+});
+
+test('of many pieces all can be shown, in a list that scrolls, and each can be kept', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const surface = Array.from({ length: 24 }, (_, i) => ball(i < 23 ? 1 : 2)).reduce((all, one, i) =>
+    apart(all, one, 3 * i),
+  );
+  const file = { name: 'beads.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(surface)) };
+  await page.locator('input[type=file]').first().setInputFiles(file);
+  await page.locator('.card.refused').waitFor();
+  const mends = page.getByRole('group', { name: 'Repairs of beads' });
+  assert.equal(await mends.getByRole('button').count(), 5);
+  await button(page, 'Show all 24 pieces').click();
+  assert.equal(await mends.getByRole('button').count(), 24);
+  const { scroll, seen } = await mends.evaluate((list) => ({ scroll: list.scrollHeight, seen: list.clientHeight }));
+  assert.ok(scroll > seen && seen < 300, `${scroll} px in ${seen}`);
+  await button(page, 'Show fewer').click();
+  assert.equal(await mends.getByRole('button').count(), 5);
+  await button(page, 'Show all 24 pieces').click();
+  await button(page, 'Keep piece 23 (32 triangles)').click();
+  const mesh = await mended(page, 'beads');
+  assert.equal(mesh.triangles, 32);
   await done();
 });
 

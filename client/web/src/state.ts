@@ -5,7 +5,7 @@ import type { MorphData } from './mesh/morph';
 import type { MeasureName, SphereData } from './mesh/distortion';
 import type { Other } from './mesh/others';
 import type { Spot } from './mesh/worker';
-import { EXTRAS, type Extra } from './mesh/extras';
+import { EXTRAS, type Content, type Extra } from './mesh/extras';
 import type { Model } from './view/models';
 
 export type Tab = 'shapes' | 'landmarks' | 'morph' | 'spheres';
@@ -24,8 +24,14 @@ export interface Shape {
   facts?: { vertices: number; triangles: number; format: string };
   /** what its file has besides the surface, as far as the page can read it */
   extras?: Extra[];
+  /** which of these a new mesh lacks, if this is the first shape */
+  beyond?: Extra[];
   /** which of these the morph takes */
   taken?: Extra[];
+  /** the parts of a glTF document */
+  content?: Content;
+  /** which of these the closed surface consists of, if the mesh is kept; none: those that were uploaded */
+  surface?: { meshes: number[]; nodes: string[] };
   /** The repairs that it was uploaded with. */
   repair?: string;
   problem?: Problem;
@@ -70,8 +76,13 @@ export interface Options {
   fit: 'auto' | 'none' | 'rigid' | 'similarity';
   /** what becomes of holes of the first shape that a repair has filled */
   holes: 'reopen' | 'filled';
+  /** of baked textures: texels a side; null: as fine as those of the shape */
+  texels: number | null;
   repair: string;
 }
+
+/** The sizes of textures that the page offers. */
+export const TEXELS = [256, 512, 1024, 2048, 4096, 8192];
 
 export const DEFAULTS: Options = {
   align: 'default',
@@ -81,6 +92,7 @@ export const DEFAULTS: Options = {
   path: 'linear',
   fit: 'auto',
   holes: 'reopen',
+  texels: null,
   repair: 'safe',
 };
 
@@ -285,10 +297,11 @@ export const givenLandmarks = (shapes = readyShapes()): WireLandmark[] =>
 const hasExtra = (shape: Shape | undefined, what: Extra) =>
   !!shape?.extras?.includes(what) || !!shape?.mesh?.attributes?.some((name) => name === what);
 
-/** What the morph can take from a shape: not from the first one, whose materials it has, and no second skin. */
+/** What the morph can take from a shape: from the first one what a new mesh lacks, and no second skin. */
 export function extrasOf(shape: Shape): Extra[] {
   const [first] = readyShapes();
-  if (!shape.mesh || shape === first) return [];
+  if (!shape.mesh) return [];
+  if (shape === first) return state.options.remesh === 'template' ? [] : (shape.beyond ?? []);
   return EXTRAS.filter((what) => {
     if (what === 'texture' && !hasExtra(first, 'texcoord')) return false; // there is nothing to paint it on
     if (what === 'skin' && state.options.remesh === 'template' && hasExtra(first, 'skin')) return false;
@@ -298,5 +311,12 @@ export function extrasOf(shape: Shape): Extra[] {
 
 /** What the morph takes from a shape. */
 export const takenFrom = (shape: Shape): Extra[] => extrasOf(shape).filter((what) => shape.taken?.includes(what));
+
+/** Of which parts the kept surface consists, where that is said. */
+export function surfaceOf(shape: Shape | undefined): { meshes?: number[]; nodes?: string[] } | null {
+  const { meshes = [], nodes = [] } = (state.options.remesh === 'template' && shape?.content && shape.surface) || {};
+  if (!meshes.length && !nodes.length) return null;
+  return { ...(meshes.length && { meshes }), ...(nodes.length && { nodes }) };
+}
 
 export const readyShapes = () => state.shapes.filter((shape) => shape.state === 'ready' && shape.mesh);

@@ -3,7 +3,8 @@
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
  * m: meshes on the server, r: a supermesh, j: a job, find=1: one that finds landmarks, go=1: one that makes the morph, where
  * it has no id yet, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l:
- * landmarks (a vertex or x_y_z for each shape), cam: camera, o: options, x: what the morph takes from later shapes (1:skin), look: of its materials, e: the weights of its
+ * landmarks (a vertex or x_y_z for each shape), cam: camera, o: options, x: what the morph takes from the shapes (1:skin), s: the parts of
+ * the first document that the surface consists of, look: of its materials, e: the weights of its
  * targets that are not shapes.
  */
 import type { Place } from 'orbmorph';
@@ -15,7 +16,9 @@ import {
   set,
   state,
   TABS,
+  surfaceOf,
   takenFrom,
+  TEXELS,
   watch,
   type Matches,
   type Options,
@@ -54,11 +57,11 @@ function decodePlace(text: string): Place | undefined {
 }
 
 function encodeOptions(o: Options): string {
-  return [o.remesh, o.tolerance, o.maxTriangles ?? '', o.path, o.fit, o.align, o.holes].join(',');
+  return [o.remesh, o.tolerance, o.maxTriangles ?? '', o.path, o.fit, o.align, o.holes, o.texels ?? ''].join(',');
 }
 
 function decodeOptions(text: string): Options {
-  const [remesh, tolerance, most, path, fit, align, holes] = text.split(',');
+  const [remesh, tolerance, most, path, fit, align, holes, texels] = text.split(',');
   const from = <T extends string>(value: string, allowed: readonly T[], otherwise: T): T =>
     (allowed as readonly string[]).includes(value) ? (value as T) : otherwise;
   return {
@@ -69,6 +72,7 @@ function decodeOptions(text: string): Options {
     path: from(path, ['linear', 'rigid'], DEFAULTS.path),
     fit: from(fit, ['auto', 'none', 'rigid', 'similarity'], DEFAULTS.fit),
     holes: from(holes, ['reopen', 'filled'], DEFAULTS.holes),
+    texels: TEXELS.find((size) => size === Number(texels)) ?? null,
     align: from(align, ['default', 'pin', 'rbf', 'rotate', 'auto'], DEFAULTS.align),
   };
 }
@@ -83,6 +87,28 @@ function restoreTaken(text: string) {
     const shape = readyShapes()[Number(number)];
     const what = EXTRAS.find((known) => known === name);
     if (shape && what) patch(shape, { taken: [...(shape.taken ?? []), what] });
+  }
+}
+
+const encodeSurface = () => {
+  const surface = surfaceOf(readyShapes()[0]);
+  return surface ? encodeURIComponent(JSON.stringify(surface)) : '';
+};
+
+function restoreSurface(text: string) {
+  const [first] = readyShapes();
+  const { content } = first ?? {};
+  if (!text || !content) return;
+  try {
+    const { meshes = [], nodes = [] } = JSON.parse(text) as { meshes?: unknown[]; nodes?: unknown[] };
+    patch(first, {
+      surface: {
+        meshes: content.meshes.map(({ number }) => number).filter((number) => meshes.includes(number)),
+        nodes: content.nodes.filter((name) => nodes.includes(name)),
+      },
+    });
+  } catch {
+    // the link is damaged: nothing is named
   }
 }
 
@@ -134,6 +160,7 @@ function encode(): string {
   );
   if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
   put('x', encodeTaken());
+  put('s', encodeSurface());
   if (state.result?.look) put('look', String(state.result.look));
   put('e', encodeExtras());
   if (state.paint !== 'direction') put('paint', state.paint);
@@ -231,7 +258,10 @@ export async function restore() {
       await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
       set({ loading: null });
       lost = meshes.filter((m) => m.status === 'rejected').length;
-      if (!lost) restoreTaken(query.get('x') ?? '');
+      if (!lost) {
+        restoreTaken(query.get('x') ?? '');
+        restoreSurface(query.get('s') ?? '');
+      }
       if (lost === ids.length) dead(`its ${lost > 1 ? `${lost} shapes are` : 'shape is'}`);
       else if (lost)
         set({

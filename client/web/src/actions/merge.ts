@@ -19,6 +19,7 @@ import {
   readyShapes,
   set,
   state,
+  surfaceOf,
   takenFrom,
   tint,
   toast,
@@ -45,7 +46,15 @@ export function buildRequest(find = false): SupermeshRequest {
   request.asset = { fit: find ? 'none' : options.fit };
   if (options.path !== 'linear') request.asset.path = options.path;
   if (options.holes !== 'reopen') request.asset.holes = options.holes;
-  const transfer = shapes.flatMap((shape, from) => takenFrom(shape).map((what) => ({ from, what })));
+  const surface = surfaceOf(shapes[0]);
+  if (surface) request.template = surface;
+  const transfer = shapes.flatMap((shape, from) =>
+    takenFrom(shape).map((what) => ({
+      from,
+      what,
+      ...(what === 'texture' && options.texels && { resolution: options.texels }),
+    })),
+  );
   if (!find && transfer.length) request.transfer = transfer;
   return request;
 }

@@ -36,6 +36,8 @@ async function draw(shape: Shape, buffer: ArrayBuffer) {
     patch(shape, {
       model,
       extras: display.extras,
+      beyond: display.beyond,
+      content: display.content,
       facts: { vertices: display.vertices, triangles: display.triangles, format: display.format },
     });
   } catch {
@@ -223,11 +225,11 @@ const sizeFor = (lengths: number[]) => {
   return longest > SMALL ? Number((1.01 * longest).toPrecision(3)) : longest && SMALL;
 };
 
-/** The pieces after the largest, as many as there is room for; those of one name by their numbers. */
+/** The pieces after the largest; those of one name by their numbers. */
 function otherParts(parts: unknown): { repair: string; label: string }[] {
   if (!Array.isArray(parts)) return [];
   const shared = (name?: string) => parts.filter((part) => part.name === name).length > 1;
-  return parts.slice(1, 5).map(({ part, triangles, name }) => {
+  return parts.slice(1).map(({ part, triangles, name }) => {
     const title = [name && `“${name}”`, (!name || shared(name)) && `piece ${part}`].filter(Boolean).join(', ');
     return { repair: `safe,part:${part}`, label: `Keep ${title} (${triangles.toLocaleString('en')} triangles)` };
   });

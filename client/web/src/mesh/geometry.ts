@@ -21,6 +21,8 @@ export interface Display {
   /** its images are decoded later */
   skin?: Skin;
   extras?: RawMesh['extras'];
+  beyond?: RawMesh['beyond'];
+  content?: RawMesh['content'];
 }
 
 export function frameOf(positions: ArrayLike<number>, used?: Uint32Array): Frame {
@@ -168,6 +170,8 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
     edges: edgesOf(index),
     skin,
     extras: raw.extras,
+    beyond: raw.beyond,
+    content: raw.content,
   };
 }
 

@@ -29,6 +29,7 @@ export interface Primitive {
   };
 }
 interface Node {
+  name?: string;
   mesh?: number;
   weights?: number[];
   skin?: number;
@@ -64,7 +65,12 @@ interface Document {
   accessors?: Accessor[];
   bufferViews?: BufferView[];
   buffers?: { uri?: string; byteLength: number }[];
-  meshes?: { primitives: Primitive[]; weights?: number[]; extras?: { targetNames?: string[]; firstShape?: number } }[];
+  meshes?: {
+    name?: string;
+    primitives: Primitive[];
+    weights?: number[];
+    extras?: { targetNames?: string[]; firstShape?: number };
+  }[];
   materials?: Material[];
   textures?: { source?: number; sampler?: number }[];
   images?: { uri?: string; bufferView?: number; mimeType?: string }[];

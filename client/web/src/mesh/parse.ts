@@ -5,7 +5,7 @@
  */
 import { unpackPrimitives } from './draco';
 import { dressOf, plyDress, tried, type Dress } from './dress';
-import { extrasIn, type Extra } from './extras';
+import { beyondIn, contentOf, extrasIn, type Content, type Extra } from './extras';
 import { readGlb, type Gltf } from './gltf';
 
 export interface RawMesh {
@@ -19,6 +19,10 @@ export interface RawMesh {
   dress?: Dress | null;
   /** what a glTF file has besides its surface */
   extras?: Extra[];
+  /** which of these a new mesh lacks, if this is the first shape */
+  beyond?: Extra[];
+  /** the parts of a glTF document */
+  content?: Content;
 }
 
 /** A growing typed array. */
@@ -413,7 +417,15 @@ function parseGltf(gltf: Gltf, format: string): RawMesh {
     for (let i = 0; i < part.index.length; i++) corners[c++] = part.index[i] + v;
     v += part.position.length / 3;
   }
-  return { format, positions, corners, dress: tried(() => dressOf(gltf, parts)), extras: extrasIn(gltf, parts) };
+  return {
+    format,
+    positions,
+    corners,
+    dress: tried(() => dressOf(gltf, parts)),
+    extras: extrasIn(gltf, parts),
+    beyond: beyondIn(gltf, parts),
+    content: contentOf(gltf),
+  };
 }
 
 /** Drops triangles that cannot be drawn because a vertex does not exist or is not finite. */

@@ -1,4 +1,5 @@
 /** Shapes: the views side by side, the list with uploads and refusals, the options. */
+import { useState } from 'preact/hooks';
 import {
   DEFAULTS,
   extrasOf,
@@ -7,6 +8,7 @@ import {
   set,
   state,
   takenFrom,
+  TEXELS,
   tint,
   type Options,
   type Shape,
@@ -115,7 +117,71 @@ function OwnMesh() {
           onChange={(on) => change({ holes: on ? 'reopen' : 'filled' })}
         />
       )}
+      {keeps && <Surface shape={first} />}
     </div>
+  );
+}
+
+/** A tick for each. */
+function Ticks<T extends string | number>({
+  items,
+  ticked,
+  onChange,
+}: {
+  items: { value: T; label: string }[];
+  ticked: T[];
+  onChange: (ticked: T[]) => void;
+}) {
+  return items.map(({ value, label }) => (
+    <label class="check" key={value}>
+      <input
+        type="checkbox"
+        checked={ticked.includes(value)}
+        onChange={(event) =>
+          onChange(event.currentTarget.checked ? [...ticked, value] : ticked.filter((other) => other !== value))
+        }
+      />
+      <span>{label}</span>
+    </label>
+  ));
+}
+
+/** Names the parts of a document that its closed surface consists of. The others stay as they are. */
+function Surface({ shape }: { shape: Shape }) {
+  const { content, surface = { meshes: [], nodes: [] } } = shape;
+  if (!content || content.meshes.length < 2) return null;
+  const named = surface.meshes.length + surface.nodes.length;
+  return (
+    <details class="fold">
+      <summary>
+        The closed surface: {named ? `${named} named ${named === 1 ? 'part' : 'parts'}` : 'what was uploaded'}
+      </summary>
+      <fieldset class="extras scrolls" aria-label="Meshes of the closed surface">
+        <legend>Meshes</legend>
+        <Ticks
+          items={content.meshes.map(({ number, name }) => ({
+            value: number,
+            label: name ? `Mesh ${number}, “${name}”` : `Mesh ${number}`,
+          }))}
+          ticked={surface.meshes}
+          onChange={(meshes) => patch(shape, { surface: { ...surface, meshes } })}
+        />
+      </fieldset>
+      {content.nodes.length > 0 && (
+        <fieldset class="extras scrolls" aria-label="Nodes of the closed surface">
+          <legend>Nodes, with those below them</legend>
+          <Ticks
+            items={content.nodes.map((name) => ({ value: name, label: `Node “${name}”` }))}
+            ticked={surface.nodes}
+            onChange={(nodes) => patch(shape, { surface: { ...surface, nodes } })}
+          />
+        </fieldset>
+      )}
+      <p class="hint">
+        Name what the morph moves. Eyes, clothes and other parts stay as they are. If the uploaded surface is made of
+        other parts, the morph is refused, and says which.
+      </p>
+    </details>
   );
 }
 
@@ -127,6 +193,13 @@ const TAKE: Record<Extra, (name: string) => string> = {
   texture: (name) => `Take the texture of ${name}, as a second look`,
 };
 
+const KEEP: Partial<Record<Extra, (name: string) => string>> = {
+  skin: (name) => `Keep the skin of ${name}`,
+  color: (name) => `Keep the further vertex colours of ${name}`,
+  texcoord: (name) => `Keep the further texture coordinates of ${name}`,
+  targets: (name) => `Keep the morph targets of ${name}`,
+};
+
 /** Takes something from a shape, or leaves it. A morph has one skin: that of another shape is left. */
 function take(shape: Shape, what: Extra, on: boolean) {
   for (const other of state.shapes)
@@ -135,13 +208,14 @@ function take(shape: Shape, what: Extra, on: boolean) {
   if (on) patch(shape, { taken: [...(shape.taken ?? []), what] });
 }
 
-/** What the morph can take from the later shapes besides their surfaces. */
+/** What the morph can take from the shapes besides their surfaces. */
 function Extras() {
+  const [first] = readyShapes();
   const offers = readyShapes().flatMap((shape) => extrasOf(shape).map((what) => ({ shape, what })));
   if (!offers.length) return null;
   return (
     <fieldset class="extras">
-      <legend>From the other shapes</legend>
+      <legend>Besides the surfaces</legend>
       {offers.map(({ shape, what }) => (
         <label class="check" key={`${shape.key} ${what}`}>
           <input
@@ -149,9 +223,24 @@ function Extras() {
             checked={takenFrom(shape).includes(what)}
             onChange={(event) => take(shape, what, event.currentTarget.checked)}
           />
-          <span>{TAKE[what](shape.name)}</span>
+          <span>{((shape === first && KEEP[what]) || TAKE[what])(shape.name)}</span>
         </label>
       ))}
+      {offers.some(({ shape, what }) => what === 'texture' && takenFrom(shape).includes(what)) && (
+        <Field label="Size of the pictures">
+          <select
+            value={String(state.options.texels ?? '')}
+            onChange={(event) => change({ texels: Number(event.currentTarget.value) || null })}
+          >
+            <option value="">As fine as those of the shape</option>
+            {TEXELS.map((size) => (
+              <option key={size} value={String(size)}>
+                {size} × {size} texels
+              </option>
+            ))}
+          </select>
+        </Field>
+      )}
       <p class="hint">
         The morph gets these on its own surface: each vertex takes the values at its place on the shape.
       </p>
@@ -219,6 +308,32 @@ function ShapeCard({ shape, index }: { shape: Shape; index: number }) {
 }
 
 const HANDLES_SHOWN = 5;
+const PIECES_SHOWN = 5;
+
+/** A button for each repair; of very many pieces, the smaller ones on request, in a list that scrolls. */
+function Mends({ shape }: { shape: Shape }) {
+  const [all, setAll] = useState(false);
+  const problem = shape.problem!;
+  const options = repairsFor(problem);
+  const unlisted = Number(problem.component_count ?? 0) - ((problem.components as unknown[] | undefined)?.length ?? 0);
+  return (
+    <>
+      <div class={all ? 'row wrap scrolls' : 'row wrap'} role="group" aria-label={`Repairs of ${shape.name}`}>
+        {options.slice(0, all ? undefined : PIECES_SHOWN).map((option) => (
+          <Button key={option.repair} onClick={() => void uploadAgain(shape.key, option.repair)}>
+            {option.label}
+          </Button>
+        ))}
+        {all && unlisted > 0 && <p class="facts">{count(unlisted)} smaller pieces are not listed.</p>}
+      </div>
+      {options.length > PIECES_SHOWN && (
+        <Button kind="quiet" aria-expanded={all} onClick={() => setAll(!all)}>
+          {all ? 'Show fewer' : `Show all ${count(options.length)} pieces`}
+        </Button>
+      )}
+    </>
+  );
+}
 
 function Refusal({ shape }: { shape: Shape }) {
   const problem = shape.problem!;
@@ -249,13 +364,7 @@ function Refusal({ shape }: { shape: Shape }) {
             {handles.length > HANDLES_SHOWN && <li>{handles.length - HANDLES_SHOWN} more</li>}
           </ul>
         )}
-        <div class="row wrap">
-          {repairsFor(problem).map((option) => (
-            <Button key={option.repair} onClick={() => void uploadAgain(shape.key, option.repair)}>
-              {option.label}
-            </Button>
-          ))}
-        </div>
+        <Mends shape={shape} />
       </div>
     </div>
   );
