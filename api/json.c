@@ -11,6 +11,7 @@
 typedef struct scanner {
   const unsigned char *at, *end, *begin;
   const char *why;
+  size_t values;
 } scanner;
 
 static int refuse(scanner *s, const char *why) {
@@ -235,6 +236,7 @@ static int scan(scanner *s) {
       return refuse(s, s->begin == s->end ? "the body is empty" : "the text ends before the value is complete");
     }
     unsigned char c = *s->at;
+    s->values++;
     if (c == '{' || c == '[') {
       if (depth == API_JSON_DEPTH) {
         return refuse(s, "the value is nested deeper than 32 levels");
@@ -262,6 +264,12 @@ static int scan(scanner *s) {
   }
   blanks(s);
   return s->at == s->end ? 1 : refuse(s, "the value is followed by more text");
+}
+
+size_t api_json_count(const char *bytes, size_t size) {
+  const unsigned char *begin = (const unsigned char *)bytes;
+  scanner s = {.at = begin, .begin = begin, .end = begin + size};
+  return scan(&s) ? s.values : 0;
 }
 
 static int by_name(const void *a, const void *b) {

@@ -21,6 +21,10 @@ typedef struct api_json_error {
 /* Returns the value, which the caller frees with cJSON_Delete(), or NULL with *error filled. O(n log n). */
 cJSON *api_json_parse(const char *bytes, size_t size, api_json_error *error);
 
+/* The number of values in these bytes, as api_json_parse() takes them; 0: they are not JSON. Takes no memory, and does
+ * not see names that repeat. O(n). */
+size_t api_json_count(const char *bytes, size_t size);
+
 /* True for well-formed UTF-8 without NUL. */
 int api_utf8_valid(const char *bytes, size_t size);
 

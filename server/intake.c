@@ -11,7 +11,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "api/json.h"
 #include "faults.h"
 #include "isolate/readers.h"
 #include "log.h"
@@ -113,8 +112,7 @@ int intake_check_here(const task_head *task, const unsigned char *sent, int fd, 
 /* Whether a description is valid JSON and agrees with what the daemon knows. Jobs of all owners read the mesh by it. */
 static int is_of(const task_head *task, const char *text) {
   api_mesh_summary summary;
-  api_json_error error;
-  cJSON *description = api_json_parse(text, strlen(text), &error);
+  cJSON *description = task_json(text);
   int fine = api_mesh_summary_of(description, &summary) && strcmp(summary.repair, task->repair) == 0 &&
              (task->format == ORB_FORMAT_AUTO || strcmp(summary.format, orb_format_name(task->format)) == 0);
   cJSON_Delete(description);
@@ -135,7 +133,7 @@ static int ask(isolated *process, const task_head *task, given_file file, api_te
   done_head done;
   char *text = NULL;
   if (isolate_send(process, FRAME_TASK, parts, 2, file.fd) != CHANNEL_OK ||
-      isolate_receive(process, CHANNEL_MOST, &f) != CHANNEL_OK) {
+      isolate_receive(process, CHANNEL_ANSWER_MOST, &f) != CHANNEL_OK) {
     return -1;
   }
   int fine =

@@ -12,6 +12,9 @@
 #include <sys/uio.h>
 
 enum { CHANNEL_VERSION = 1, CHANNEL_MOST = 64 << 20, CHANNEL_PARTS = 3 };
+/* The daemon takes no larger frame from a process: objects come as descriptors. The largest descriptions and refusals
+ * have 3 to 4 MB. */
+enum { CHANNEL_ANSWER_MOST = 16 << 20 };
 
 typedef enum frame_type {
   FRAME_TASK = 1, /* to the process: what to do, and its limits */

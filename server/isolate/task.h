@@ -63,10 +63,12 @@ channel_result task_answer(int channel, done_head *done, const char *json, const
 /* The same, then ends the process. */
 _Noreturn void task_end(int channel, done_head *done, const char *json, const api_problem *problem);
 
-/* The daemon's side. Reads FRAME_DONE: json is allocated with malloc(), or NULL. The caller checks whether it is JSON,
- * with task_is_json() or by reading it. 0: the result contradicts itself. */
+/* The daemon's side. Reads FRAME_DONE: json is allocated with malloc(), or NULL. The caller checks it with task_json().
+ * 0: the result contradicts itself. */
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem);
-int task_is_json(const char *text);
+/* Reads JSON that a process wrote; the caller frees it with cJSON_Delete(). NULL: it is none, or has more values than
+ * any description or refusal. Each would take some 80 bytes of the daemon's memory. */
+cJSON *task_json(const char *text);
 /* A limit on the processor time of a job with this many threads until its deadline. */
 int64_t task_cpu_seconds(int64_t deadline_ms, int threads);
 

@@ -13,9 +13,9 @@
 int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const resource *row,
                    const orb_align_shape *shapes, int32_t shape_count, orb_alignment *out);
 
-/* Stores the bytes of an alignment, and its row, which counts for the tenant. Blocks for a commit. */
-store_result alignments_publish(catalogue *cat, objects *store, const char *id, const char *tenant, const void *bytes,
-                                size_t size);
+/* Stores an alignment that was written to a temporary file, and its row, which counts for the tenant. STORE_FULL: the
+ * disk is nearly full. Blocks for a commit. The caller calls objects_abandon(). */
+store_result alignments_publish(catalogue *cat, objects *store, const char *id, const char *tenant, object_temp *temp);
 
 /* Keeps an alignment of these shapes, unless the disk is nearly full. Failures are logged; their only consequence is
  * that a later request aligns again. Blocks for a commit. */

@@ -129,47 +129,46 @@ static int may_make(api_job_kind kind, object_kind object) {
                                    : object == OBJECT_ASSET || object == OBJECT_PLACES || object == OBJECT_SPHERES;
 }
 
-static store_result copy(const run_env *env, orb_context *ctx, const object_head *head, int from) {
+/* Copies the bytes of a descriptor to a temporary file. The process could still write to the descriptor. */
+static store_result copy(const run_env *env, orb_context *ctx, int from, object_temp *temp, int64_t *bytes) {
   struct stat info;
-  object_temp temp;
   if (fstat(from, &info) != 0) {
     return STORE_ERROR;
   }
-  store_result stored = objects_begin(env->store, &temp);
+  store_result stored = objects_begin(env->store, temp);
   off_t at = 0;
   while (stored == STORE_OK && at < info.st_size) {
     off_t left = info.st_size - at;
-    ssize_t n = sendfile(temp.fd, from, &at, (size_t)(left < COPY_BYTES ? left : COPY_BYTES));
-    if (n <= 0 && errno != EINTR) {
+    ssize_t n = sendfile(temp->fd, from, &at, (size_t)(left < COPY_BYTES ? left : COPY_BYTES));
+    if (n == 0) {
+      stored = STORE_ERROR; /* the process has cut it short */
+    } else if (n < 0 && errno != EINTR) {
       stored = errno == ENOSPC || errno == EDQUOT || errno == EFBIG ? STORE_FULL : STORE_ERROR;
     } else if (orb_context_check(ctx) != ORB_OK) {
       stored = STORE_ERROR;
     }
     FAULT_POINT("temp-written");
   }
-  if (stored == STORE_OK) {
-    stored = objects_publish(env->store, &temp, head->kind, head->id);
-  }
-  objects_abandon(&temp);
+  *bytes = (int64_t)at;
   return stored;
 }
 
-/* Keeps an alignment, whose row has the hash of its bytes. The process could still write to the descriptor, so they are
- * copied first. */
-static void take_alignment(const run_env *env, const char *id, int fd) {
-  struct stat info;
-  size_t size = fstat(fd, &info) == 0 && info.st_size > 0 ? (size_t)info.st_size : 0;
-  void *bytes = size ? malloc(size) : NULL;
-  if (!bytes || pread(fd, bytes, size, 0) != (ssize_t)size ||
-      alignments_publish(env->cat, env->store, id, env->tenant, bytes, size) != STORE_OK) {
+/* Keeps an alignment, whose row has the hash of its bytes. */
+static void take_alignment(const run_env *env, orb_context *ctx, const char *id, int fd) {
+  object_temp temp = {.fd = -1};
+  int64_t bytes;
+  if (copy(env, ctx, fd, &temp, &bytes) != STORE_OK ||
+      alignments_publish(env->cat, env->store, id, env->tenant, &temp) != STORE_OK) {
     log_warn("the alignment %s could not be kept", id);
   }
-  free(bytes);
+  objects_abandon(&temp);
 }
+
+typedef int64_t made_bytes[OBJECT_KINDS]; /* of each object that the process has made */
 
 /* Stores an object that the process has made: 1, 0 with the problem, −1: it may not make that. */
 static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j, const char *alignment,
-                       const frame *f, run_output *out, api_problem *problem) {
+                       const frame *f, made_bytes bytes, run_output *out, api_problem *problem) {
   object_head head;
   if (f->size != sizeof head || f->fd < 0) {
     return -1;
@@ -179,7 +178,7 @@ static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, 
     if (!alignment[0] || memcmp(head.id, alignment, sizeof head.id) != 0 || out->holds) {
       return -1;
     }
-    take_alignment(env, alignment, f->fd);
+    take_alignment(env, ctx, alignment, f->fd);
     return 1;
   }
   if (!may_make(kind, head.kind) || memcmp(head.id, j->key, sizeof head.id) != 0) {
@@ -189,17 +188,33 @@ static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, 
     objects_hold(env->store);
     out->holds = 1;
   }
-  store_result stored = copy(env, ctx, &head, f->fd);
+  object_temp temp = {.fd = -1};
+  store_result stored = copy(env, ctx, f->fd, &temp, &bytes[head.kind]);
+  stored = stored == STORE_OK ? objects_publish(env->store, &temp, head.kind, head.id) : stored;
+  objects_abandon(&temp);
   if (stored != STORE_OK && orb_context_check(ctx) == ORB_OK) {
     run_problem_of_store(stored, problem);
   }
   return stored == STORE_OK;
 }
 
-static int take_done(const run_job *j, api_job_kind kind, const frame *f, run_output *out, api_problem *problem) {
+/* Whether a result has a description, and as many bytes as its objects, by which quotas count it. */
+static int is_result(const done_head *done, const char *json, const made_bytes bytes) {
+  cJSON *description = json ? task_json(json) : NULL;
+  const int is_json = description != NULL;
+  int64_t sum = 0;
+  for (int kind = 0; kind < OBJECT_KINDS; kind++) {
+    sum += bytes[kind];
+  }
+  cJSON_Delete(description);
+  return is_json && done->bytes == sum;
+}
+
+static int take_done(const run_job *j, api_job_kind kind, const frame *f, const made_bytes bytes, run_output *out,
+                     api_problem *problem) {
   done_head done;
   char *json;
-  if (!task_read_done(f, &done, &json, problem) || (done.fine && !(json && task_is_json(json)))) {
+  if (!task_read_done(f, &done, &json, problem) || (done.fine && !is_result(&done, json, bytes))) {
     free(json);
     api_problem_free(problem);
     return -1;
@@ -230,19 +245,22 @@ static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_
                      const char *alignment, int64_t hold_ms, run_output *out, api_problem *problem,
                      channel_result *why) {
   frame f;
+  made_bytes bytes = {0};
   int count = 0;
   for (int taken = 1;;) {
-    *why = isolate_receive(p, CHANNEL_MOST, &f);
+    *why = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
     if (*why != CHANNEL_OK) {
       return -1;
     }
     if (f.type == FRAME_PROGRESS && !out->holds) {
       take_progress(env, &f);
     } else if (f.type == FRAME_OBJECT) {
-      taken = out->holds && ++count >= OBJECTS_MOST ? -1 : take_object(env, ctx, kind, j, alignment, &f, out, problem);
+      taken = out->holds && ++count >= OBJECTS_MOST
+                  ? -1
+                  : take_object(env, ctx, kind, j, alignment, &f, bytes, out, problem);
       p->last_ms = out->holds ? orb_clock_ms() + hold_ms : 0;
     } else if (f.type == FRAME_DONE) {
-      taken = take_done(j, kind, &f, out, problem);
+      taken = take_done(j, kind, &f, bytes, out, problem);
     } else if (f.type != FRAME_PROGRESS || orb_clock_ms() >= p->last_ms) {
       taken = -1;
     }

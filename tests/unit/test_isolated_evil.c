@@ -8,18 +8,31 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cmocka.h>
 #include <sodium.h>
 
+#include "api/json.h"
 #include "isolate/task.h"
 #include "log.h"
 #include "store/owners.h"
 #include "worker/isolated.h"
 
-/* What the process does after the first object. */
-enum { DAMAGED = 'a', NOTHING = 'b', PROGRESS = 'c', OBJECTS = 'd' };
+/* What the process does: the first four after an object. */
+enum {
+  DAMAGED = 'a',
+  NOTHING = 'b',
+  PROGRESS = 'c',
+  OBJECTS = 'd',
+  FEW_BYTES = 'f',
+  LONG_REFUSAL = '1',
+  MANY_VALUES = '2',
+  LARGE_ALIGNMENT = '3'
+};
+
+enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
 
 typedef struct stored {
   char data[64];
@@ -75,13 +88,53 @@ static void send_progress(int channel) {
   }
 }
 
+/* A refusal with an array of zeros of so many bytes in all. */
+_Noreturn static void refuse_at_length(int channel, size_t bytes) {
+  done_head done = {.problem = "corrupt", .detail = "An input was altered."};
+  char *text = malloc(bytes + 8);
+  if (!text) {
+    _exit(9);
+  }
+  size_t at = (size_t)sprintf(text, "\"a\":[");
+  for (; at < bytes; at += 2) {
+    memcpy(text + at, "0,", 2);
+  }
+  const struct iovec parts[2] = {{&done, sizeof done}, {text, at + (size_t)sprintf(text + at, "0]")}};
+  _exit(channel_send(channel, FRAME_DONE, parts, 2, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
+}
+
+_Noreturn static void send_large_alignment(int channel, const char *text) {
+  object_head head = {.kind = OBJECT_ALIGNMENT};
+  const struct iovec part = {&head, sizeof head};
+  api_json_error error;
+  api_problem ignored = {0};
+  api_supermesh_request request;
+  memset(&request, 0, sizeof request);
+  int fd = memfd_create("alignment", MFD_CLOEXEC);
+  if (!api_supermesh_request_read(api_json_parse(text, strlen(text), &error), &request, &ignored) ||
+      !api_alignment_id(&request, head.id) || ftruncate(fd, ALIGNMENT_BYTES) != 0 ||
+      channel_send(channel, FRAME_OBJECT, &part, 1, fd, NULL, NULL) != CHANNEL_OK) {
+    _exit(9);
+  }
+  _exit(0);
+}
+
+/* A result that says that it has no bytes, so that no quota counts it. */
+_Noreturn static void claim_no_bytes(int channel, const task_head *task) {
+  done_head done = {.fine = 1};
+  send_object(channel, task);
+  task_end(channel, &done, "{}", NULL);
+}
+
 static void evil(int channel) {
   frame f;
   task_head task;
+  char request[512] = "";
   if (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) != CHANNEL_OK || f.size < sizeof task) {
     _exit(9);
   }
   memcpy(&task, f.bytes, sizeof task);
+  snprintf(request, sizeof request, "%s", (const char *)f.bytes + sizeof task);
   do {
     frame_free(&f);
   } while (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) == CHANNEL_OK && f.type != FRAME_GO);
@@ -91,6 +144,18 @@ static void evil(int channel) {
     send_object(channel, &task);
     api_refuse(&problem, "corrupt", "An input was altered.");
     task_end(channel, &done, NULL, &problem);
+  }
+  switch (task.key[0]) {
+    case FEW_BYTES:
+      claim_no_bytes(channel, &task);
+    case LONG_REFUSAL:
+      refuse_at_length(channel, LONG_BYTES);
+    case MANY_VALUES:
+      refuse_at_length(channel, 2 * VALUES);
+    case LARGE_ALIGNMENT:
+      send_large_alignment(channel, request);
+    default:
+      break;
   }
   for (int sent = 0;; sent++) {
     if (task.key[0] == OBJECTS || sent == 0) {
@@ -123,14 +188,20 @@ static void add_damaged_mesh(stored *s, const char *id) {
 
 /* Runs a job in a process that does this. Afterwards nothing holds the store. */
 static int run(stored *s, char what, api_problem *problem, isolated_end *end) {
-  char key[API_ID_SIZE], mesh[API_ID_SIZE], request[128];
+  char key[API_ID_SIZE], mesh[API_ID_SIZE], request[512];
+  const int merges = what == LARGE_ALIGNMENT;
   fill_id(key, what);
   fill_id(mesh, 'e');
-  snprintf(request, sizeof request, "{\"mesh\":\"%s\"}", mesh);
+  snprintf(request, sizeof request,
+           merges ? "{\"shapes\":[{\"mesh\":\"%s\",\"name\":\"a\"},{\"mesh\":\"%s\",\"name\":\"b\"}],"
+                    "\"align\":{\"method\":\"rotate\"}}"
+                  : "{\"mesh\":\"%s\"}",
+           mesh, mesh);
   const run_job j = {.key = key, .request = request};
   const isolated_limits limits = {.memory = 64 << 20, .threads = 1, .max_triangles = 1000, .hold_ms = 300};
   run_output out = {0};
-  int fine = isolated_run(&s->env, s->ctx, API_JOB_EMBEDDING, &j, &limits, &out, problem, end);
+  int fine =
+      isolated_run(&s->env, s->ctx, merges ? API_JOB_SUPERMESH : API_JOB_EMBEDDING, &j, &limits, &out, problem, end);
   if (out.holds) {
     objects_let_go(s->env.store);
   }
@@ -169,6 +240,37 @@ static void test_an_object_and_then_no_end(void **state) {
   }
 }
 
+static long peak_kilobytes(void) {
+  struct rusage used;
+  assert_int_equal(getrusage(RUSAGE_SELF, &used), 0);
+  return used.ru_maxrss;
+}
+
+/* The daemon takes no more memory, whatever a process says. */
+static void test_answers_that_cost_memory(void **state) {
+  static const char ways[] = {LARGE_ALIGNMENT, LONG_REFUSAL, MANY_VALUES};
+  static const long most[] = {16, 16, 64}; /* megabytes */
+  for (size_t i = 0; i < sizeof ways; i++) {
+    stored *s = *state;
+    api_problem problem = {0};
+    isolated_end end;
+    const long before = peak_kilobytes();
+    assert_false(run(s, ways[i], &problem, &end));
+    const long more = (peak_kilobytes() - before) / 1024;
+    if (more > most[i] || !end.died) {
+      fail_msg("way %c: %ld MB, died %d", ways[i], more, end.died);
+    }
+    assert_null(problem.name);
+  }
+}
+
+static void test_a_result_that_says_it_has_no_bytes(void **state) {
+  api_problem problem = {0};
+  isolated_end end;
+  assert_false(run(*state, FEW_BYTES, &problem, &end));
+  assert_true(end.died);
+}
+
 int main(int count, char **arguments) {
   if (count > 1 && strcmp(arguments[1], ISOLATE_FLAG) == 0) {
     isolate_zygote(evil);
@@ -177,6 +279,8 @@ int main(int count, char **arguments) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_an_object_and_then_a_damaged_input, setup, teardown),
       cmocka_unit_test_setup_teardown(test_an_object_and_then_no_end, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
 }
