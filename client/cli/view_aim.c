@@ -160,7 +160,11 @@ static char find_up(const view_mesh *mesh, view_sign *sign) {
     return biped;
   }
   *sign = VIEW_BY_FEET;
-  if ((lies && (up = find_standing(&g, across, 2)) != 0) || (below && (up = 'y') != 0)) {
+  if ((lies && (up = find_standing(&g, across, 2)) != 0 && !view_is_thin(mesh, up)) || (below && (up = 'y') != 0)) {
+    return up;
+  }
+  *sign = VIEW_BY_HORNS;
+  if ((up = view_find_horns(mesh)) != 0) {
     return up;
   }
   *sign = VIEW_BY_NOTHING;

@@ -33,8 +33,10 @@ static int angle(const cli *c, cli_option_id id, double *out) {
 
 /* Says which way is up where the view has decided it. */
 static void note_up(const cli *c, const view_options *options) {
-  static const char *const by[] = {
-      [VIEW_BY_FEET] = "it stands on feet", [VIEW_BY_LEGS] = "it has two legs", [VIEW_BY_BASE] = "it has a flat base"};
+  static const char *const by[] = {[VIEW_BY_FEET] = "it stands on feet",
+                                   [VIEW_BY_LEGS] = "it has two legs",
+                                   [VIEW_BY_BASE] = "it has a flat base",
+                                   [VIEW_BY_HORNS] = "it has two horns"};
   char axis[3] = {'-', options->up, 0};
   if (options->sign == VIEW_BY_NOTHING) {
     cli_note(c, "nothing in the first shape tells which way is up: y is, as in glTF; --up sets another axis");

@@ -3,7 +3,14 @@
 #define ORB_CLI_VIEW_OPTIONS_H
 
 /* What in the first shape says which way is up. */
-typedef enum view_sign { VIEW_BY_USER, VIEW_BY_NOTHING, VIEW_BY_FEET, VIEW_BY_LEGS, VIEW_BY_BASE } view_sign;
+typedef enum view_sign {
+  VIEW_BY_USER,
+  VIEW_BY_NOTHING,
+  VIEW_BY_FEET,
+  VIEW_BY_LEGS,
+  VIEW_BY_BASE,
+  VIEW_BY_HORNS
+} view_sign;
 
 typedef struct view_options {
   int poses;  /* columns of a sheet: evenly spaced weights from one shape to the next, both included */

@@ -298,6 +298,40 @@ test('view shows what has a flat base upright, and says why', async (t) => {
   assert.match(await said(still(ball(3))), /^nothing in the first shape tells which way is up/);
 });
 
+/** The head of a cow: an egg on a broad neck with a snout and two horns. */
+function head() {
+  const horns = [unit([0.5, 1, 0]), unit([-0.5, 1, 0])];
+  return ball(5, (p) => {
+    const near = Math.max(...horns.map((h) => p[0] * h[0] + p[1] * h[1] + p[2] * h[2]));
+    const horn = Math.exp(-(((1 - near) / 0.02) ** 2));
+    const snout = Math.max(0, p[2]) ** 3;
+    return [p[0] * (1 + 0.4 * horn), p[1] + 0.7 * horn - 0.3 * snout, 0.9 * p[2] + 0.35 * snout];
+  });
+}
+const unit = (v) => v.map((x) => x / Math.hypot(...v));
+
+/** That view says which axis points up in a mesh whose y axis does; an outline is as high upside down. */
+async function assertUp(t, mesh, ways) {
+  const cwd = await folder(t);
+  for (const way of ways) {
+    await writeFile(path.join(cwd, 'in.glb'), still(mesh, turns[way]));
+    const { err } = await run(['view', 'in.glb'], { cwd });
+    const axis = { 'x up': 'x', 'z down': '-z' }[way] ?? 'z';
+    assert.match(err, new RegExp(`^${axis} points up, .*: it has two horns; --up y shows it as in glTF\\n$`), way);
+  }
+}
+
+test('view shows heads with horns upright, and says why', async (t) => assertUp(t, head(), Object.keys(turns)));
+
+// the goat's is shown as in the file if x points up
+for (const [name, ways] of [
+  ['good/goathead', ['z up', 'z up, sideways', 'z down']],
+  ['bad/cowhead_open', Object.keys(turns)],
+])
+  test(`view shows ${name} upright`, { skip: !real.there }, async (t) =>
+    assertUp(t, parse(await readFile(path.join(real.folder, `${name}.obj`), 'utf8')), ways),
+  );
+
 for (const name of ['penguin', 'nefertiti_70k'])
   test(`view shows ${name} upright`, { skip: !real.there }, async (t) => {
     const file = path.join(real.folder, 'good', `${name}.obj`);
