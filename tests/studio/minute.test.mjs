@@ -5,7 +5,7 @@ import { readFile, writeFile } from 'node:fs/promises';
 import { pathToFileURL } from 'node:url';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { basename, join } from 'node:path';
 import { browser, daemon } from './started.mjs';
 import { countPixels, difference, shot } from './pictures.mjs';
 import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
@@ -39,6 +39,38 @@ test('the first page plays a morph without a click, and offers three more', asyn
   // the shapes of the film can be opened, and are accepted
   await button(page, 'Try with samples').click();
   await counted(page.locator('.card.ready'), 3, 'its shapes are open');
+  await done();
+});
+
+/** Drops files on the page, as from a folder. */
+async function dropFiles(page, ...paths) {
+  const files = await Promise.all(
+    paths.map(async (path) => [basename(path), (await readFile(path)).toString('base64')]),
+  );
+  const data = await page.evaluateHandle((list) => {
+    const transfer = new DataTransfer();
+    for (const [name, bytes] of list)
+      transfer.items.add(new File([Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0))], name));
+    return transfer;
+  }, files);
+  for (const event of ['dragenter', 'dragover', 'drop'])
+    await page.dispatchEvent('body', event, { dataTransfer: data });
+}
+
+test('two files that are dropped on the first page morph without a click; a third does not', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await until(async () => (await countPixels(page, '.hero', vivid)) > 4000, 'a shape is drawn');
+  await dropFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await defaultShown(page);
+  const stage = page.locator('.morph .pane-view');
+  const first = await shot(stage);
+  await until(async () => (await difference(browser, first, await shot(stage))) > 0.01, 'it plays');
+  const { jobs } = await (await fetch(`${daemon.url}/v1/jobs`)).json();
+  await dropFiles(page, sample('elephant.ply'));
+  await counted(page.locator('.card.ready'), 3, 'it is open');
+  await page.waitForTimeout(700);
+  const later = await (await fetch(`${daemon.url}/v1/jobs`)).json();
+  assert.equal(later.jobs.length, jobs.length, 'who adds a shape says when to morph');
   await done();
 });
 

@@ -1,6 +1,7 @@
 /** The frame of the page: header, stage, inspector. */
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
-import { set, state, type Tab } from '../state';
+import { readyShapes, set, state, type Tab } from '../state';
+import { startMerge } from '../actions/merge';
 import { addFiles } from '../actions/shapes';
 import { redo, removeLandmark, undo } from '../actions/landmarks';
 import { player } from '../player';
@@ -138,6 +139,15 @@ function Inspector() {
   return <Part />;
 }
 
+/** Opens dropped files. Two or more on the first page are morphed at once, if all are accepted and nothing was done since. */
+async function takeDropped(files: File[]) {
+  const isFirst = !state.shapes.length;
+  await addFiles(files);
+  const { shapes, landmarks, tab, running, result } = state;
+  const untouched = shapes.length === files.length && !landmarks.length && tab === 'shapes' && !running && !result;
+  if (isFirst && files.length > 1 && untouched && readyShapes().length === files.length) await startMerge();
+}
+
 function useDrop() {
   useEffect(() => {
     let depth = 0;
@@ -155,7 +165,7 @@ function useDrop() {
       event.preventDefault();
       depth = 0;
       set({ dragging: false });
-      void addFiles(event.dataTransfer!.files);
+      void takeDropped([...event.dataTransfer!.files]);
     };
     const all: [string, (event: never) => void][] = [
       ['dragenter', enter],
