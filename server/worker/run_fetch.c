@@ -55,7 +55,7 @@ static int refuse_url(const api_fetch_request *wish, const char *name, const cha
 static int refuse(const download *d, const api_fetch_request *wish, const net_answer *answer, api_problem *problem) {
   char why[64];
   if (d->stored != STORE_OK) {
-    run_problem_of_store(d->stored, problem);
+    task_refuse_store(d->stored, problem);
     return 0;
   }
   switch (answer->end) {
@@ -152,7 +152,7 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
         (long long)wish->quota);
     api_json_member_integer(&problem->facts, "quota", wish->quota);
   } else if (stored != STORE_OK) {
-    run_problem_of_store(stored, problem);
+    task_refuse_store(stored, problem);
   }
   return stored == STORE_OK && !problem->name && orb_context_check(d->ctx) == ORB_OK;
 }
