@@ -147,7 +147,9 @@ static int store_within(request *r, const intake_file *file, int64_t memory, int
 /* Checks the file with the memory of the task. If it needs more, waits for all that so many bytes can need. */
 static void store_mesh(request *r, const intake_file *file) {
   memory_budget *memory = r->srv->memory;
-  const int64_t first = r->away_task.memory, most = budget_for_densest_file(memory, BUDGET_CHECKS, r->received);
+  const int fills = (file->upload->options.repair & ORB_REPAIR_FILL_HOLES) != 0;
+  const int64_t first = r->away_task.memory;
+  const int64_t most = budget_for_densest_file(memory, BUDGET_CHECKS, r->received, fills);
   const int64_t kept = r->away_task.part == BUDGET_CHECKS ? first : 0; /* the pool gives this back */
   if (store_within(r, file, first, first >= most)) {
     return;
@@ -192,6 +194,6 @@ enum MHD_Result handle_mesh_file(request *r) {
   const int large = r->received > BUDGET_SMALL_FILE;
   r->away_task.part = large ? BUDGET_CHECKS : BUDGET_SMALL;
   r->away_task.memory = large ? budget_for_file(memory, BUDGET_CHECKS, r->received)
-                              : budget_for_densest_file(memory, BUDGET_SMALL, r->received);
+                              : budget_for_densest_file(memory, BUDGET_SMALL, r->received, 0);
   return request_go_away(r, large ? r->srv->large_checks : r->srv->checks, upload_away);
 }

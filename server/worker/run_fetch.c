@@ -132,7 +132,8 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
   } else if (stored == STORE_NOT_FOUND) {
     while (sem_wait(d->options->checks) != 0) { /* interrupted by a signal */
     }
-    const int64_t memory = budget_for_densest_file(d->options->memory, BUDGET_CHECKS, d->size);
+    const int fills = (wish->upload.options.repair & ORB_REPAIR_FILL_HOLES) != 0;
+    const int64_t memory = budget_for_densest_file(d->options->memory, BUDGET_CHECKS, d->size, fills);
     budget_wait(d->options->memory, BUDGET_CHECKS, memory);
     const intake_limits limits = {.memory = memory,
                                   .deadline_ms = orb_clock_ms() + d->options->check_ms,
