@@ -6,6 +6,9 @@
 /* Bytes of memory per byte of the file. FILE_BYTES: real files take up to 5.4 in the budget of the check, and its
  * process takes some more. A larger figure would let fewer checks run side by side. */
 enum { FILE_BASE = 4 << 20, FILE_BYTES = 9, DENSEST_BYTES = 200 };
+/* Filling holes makes up to 24 triangles for each edge of a hole, of which a file has one in 4 bytes, and 131,072 in
+ * all. Each takes 1.2 KB while the fill is made fair. */
+enum { FILL_BYTES = 7200, FILL_MOST = 160 << 20 };
 
 struct memory_budget {
   pthread_mutex_t lock;
@@ -106,15 +109,16 @@ void budget_give(memory_budget *b, budget_part part, int64_t bytes, const void *
   }
 }
 
-static int64_t for_file(const memory_budget *b, budget_part part, int64_t bytes, int64_t multiple) {
-  const int64_t most = b->most[part];
-  return most <= FILE_BASE || bytes > (most - FILE_BASE) / multiple ? most : FILE_BASE + multiple * bytes;
+static int64_t for_file(const memory_budget *b, budget_part part, int64_t bytes, int64_t multiple, int64_t more) {
+  const int64_t most = b->most[part], base = FILE_BASE + more;
+  return most <= base || bytes > (most - base) / multiple ? most : base + multiple * bytes;
 }
 
 int64_t budget_for_file(const memory_budget *b, budget_part part, int64_t bytes) {
-  return for_file(b, part, bytes, FILE_BYTES);
+  return for_file(b, part, bytes, FILE_BYTES, 0);
 }
 
-int64_t budget_for_densest_file(const memory_budget *b, budget_part part, int64_t bytes) {
-  return for_file(b, part, bytes, DENSEST_BYTES);
+int64_t budget_for_densest_file(const memory_budget *b, budget_part part, int64_t bytes, int fills) {
+  const int64_t fill = bytes < FILL_MOST / FILL_BYTES ? FILL_BYTES * bytes : FILL_MOST;
+  return for_file(b, part, bytes, DENSEST_BYTES, fills ? fill : 0);
 }

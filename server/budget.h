@@ -39,6 +39,7 @@ void budget_give(memory_budget *b, budget_part part, int64_t bytes, const void *
 /* What the check of a file of other programs needs, and what the densest files known need (docs/limits.md); at most
  * budget_most(). */
 int64_t budget_for_file(const memory_budget *b, budget_part part, int64_t bytes);
-int64_t budget_for_densest_file(const memory_budget *b, budget_part part, int64_t bytes);
+/* fills: the repair fills holes. */
+int64_t budget_for_densest_file(const memory_budget *b, budget_part part, int64_t bytes, int fills);
 
 #endif

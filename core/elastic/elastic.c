@@ -413,7 +413,7 @@ static orb_status factor_create(registration *r) {
       }
     }
   }
-  orb_status status = orb_factor_create(a->count, couplings, count, &r->factor);
+  orb_status status = orb_factor_create(r->ctx, a->count, couplings, count, &r->factor);
   orb_free(r->ctx, couplings);
   return status;
 }

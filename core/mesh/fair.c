@@ -143,7 +143,7 @@ static orb_status solve(plate *p, double *x) {
     }
   }
   if (status == ORB_OK) {
-    status = orb_factor_create(unknowns, couplings, count, &factor);
+    status = orb_factor_create(p->ctx, unknowns, couplings, count, &factor);
   }
   if (status == ORB_OK) {
     status = orb_factor_compute(factor, diagonal);

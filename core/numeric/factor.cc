@@ -14,29 +14,68 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
+using Entry = Eigen::Triplet<double>;
+
+// A block of the context that nobody touches. It stands for memory that Eigen takes.
+class Charge {
+ public:
+  Charge(orb_context *ctx, size_t bytes) : ctx_(ctx), block_(orb_alloc(ctx, bytes, 1)) {
+    if (block_ == nullptr) {
+      throw std::bad_alloc();
+    }
+  }
+  Charge(const Charge &) = delete;
+  Charge &operator=(const Charge &) = delete;
+  ~Charge() { orb_free(ctx_, block_); }
+
+ private:
+  orb_context *ctx_;
+  void *block_;
+};
+
+// Bytes of an entry of a sparse matrix, and of an unknown: of the ordering, of permutations and of right sides.
+constexpr size_t ENTRY_BYTES = sizeof(double) + sizeof(int), UNKNOWN_BYTES = 128;
+
+// An LDLT that tells how many entries its factor has.
+class Solver : public Eigen::SimplicialLDLT<Matrix> {
+ public:
+  size_t entries() const { return static_cast<size_t>(m_matrix.nonZeros()); }
+};
+
+void fill(orb_context *ctx, Matrix *matrix, const orb_coupling *couplings, int64_t count) {
+  const int32_t n = static_cast<int32_t>(matrix->rows());
+  const size_t entries = 2 * static_cast<size_t>(count) + static_cast<size_t>(n);
+  const Charge charge(ctx, entries * (sizeof(Entry) + ENTRY_BYTES));  // of the list, and of its entries by rows
+  std::vector<Entry> list;
+  list.reserve(entries);
+  for (int64_t i = 0; i < count; i++) {
+    list.emplace_back(couplings[i].row, couplings[i].column, couplings[i].value);
+    list.emplace_back(couplings[i].column, couplings[i].row, couplings[i].value);
+  }
+  for (int32_t i = 0; i < n; i++) {
+    list.emplace_back(i, i, 1);
+  }
+  matrix->setFromTriplets(list.begin(), list.end());
+}
+
 }  // namespace
 
 struct orb_factor {
   Matrix matrix;
-  Eigen::SimplicialLDLT<Matrix> solver;
+  Solver solver;
+  std::unique_ptr<Charge> charge;
 };
 
-extern "C" orb_status orb_factor_create(int32_t n, const orb_coupling *couplings, int64_t count, orb_factor **out) {
+extern "C" orb_status orb_factor_create(orb_context *ctx, int32_t n, const orb_coupling *couplings, int64_t count,
+                                        orb_factor **out) {
   *out = nullptr;
   try {
     auto factor = std::make_unique<orb_factor>();
-    std::vector<Eigen::Triplet<double>> list;
-    list.reserve(2 * static_cast<size_t>(count) + static_cast<size_t>(n));
-    for (int64_t i = 0; i < count; i++) {
-      list.emplace_back(couplings[i].row, couplings[i].column, couplings[i].value);
-      list.emplace_back(couplings[i].column, couplings[i].row, couplings[i].value);
-    }
-    for (int32_t i = 0; i < n; i++) {
-      list.emplace_back(i, i, 1);
-    }
     factor->matrix.resize(n, n);
-    factor->matrix.setFromTriplets(list.begin(), list.end());
-    factor->solver.analyzePattern(factor->matrix);
+    fill(ctx, &factor->matrix, couplings, count);
+    factor->solver.analyzePattern(factor->matrix);  // the factor's memory is not touched before it is computed
+    const size_t entries = 2 * static_cast<size_t>(factor->matrix.nonZeros()) + factor->solver.entries();
+    factor->charge = std::make_unique<Charge>(ctx, entries * ENTRY_BYTES + static_cast<size_t>(n) * UNKNOWN_BYTES);
     *out = factor.release();
     return ORB_OK;
   } catch (const std::exception &) {

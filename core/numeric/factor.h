@@ -17,8 +17,10 @@ typedef struct orb_coupling {
   double value;
 } orb_coupling;
 
-/* Orders the unknowns and finds the pattern of the factor. Entries of one place add up. */
-ORB_MUST_CHECK orb_status orb_factor_create(int32_t n, const orb_coupling *couplings, int64_t count, orb_factor **out);
+/* Orders the unknowns and finds the pattern of the factor. Entries of one place add up. The factor counts in the budget
+ * of the context: O(n log n) for a surface. */
+ORB_MUST_CHECK orb_status orb_factor_create(orb_context *ctx, int32_t n, const orb_coupling *couplings, int64_t count,
+                                            orb_factor **out);
 void orb_factor_destroy(orb_factor *factor);
 
 /* Factorises with this diagonal, which must make the sum of every row positive. O(n^1.5) for a surface. */

@@ -98,7 +98,9 @@ int admin_command_read(admin_command *out, const admin_kind *kind, int *argc, ch
   *out = (admin_command){.kind = kind, .verb = verb, .name = "-"};
   if (verb->named) {
     out->name = *argc > from ? argv[from++] : "";
-    if (!admin_read_name(out->name, word)) {
+    const int is_id =
+        kind->takes_ids && strlen(out->name) == 64 && out->name[strspn(out->name, "0123456789abcdef")] == 0;
+    if (!is_id && !admin_read_name(out->name, word)) {
       return wrong(kind, "NAME", " must have 1 to 63 letters, digits, '-', '_' and '.', and not begin with '-'");
     }
   }

@@ -38,6 +38,7 @@ typedef struct admin_kind {
   const char *name;   /* "token": the first word of the line */
   const char *usage;  /* lines of the commands */
   const char *values; /* the values that the flags take */
+  int takes_ids;      /* NAME may be an id, which has 64 letters */
   admin_verb verbs[ADMIN_VERBS];
   admin_flag flags[ADMIN_FLAGS];
   /* Makes a secret: what is shown, and the word that stands for it in the line. NULL: the kind has none. */

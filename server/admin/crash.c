@@ -5,8 +5,8 @@
 #include "store/crashes.h"
 
 static int apply(catalogue *cat, const char *line, api_text *reply) {
-  char verb[8], name[64];
-  if (sscanf(line, "crash %7s %63s", verb, name) != 2) {
+  char verb[8], name[65];
+  if (sscanf(line, "crash %7s %64s", verb, name) != 2) {
     api_text_add(reply, "unknown command\n");
     return 2;
   }
@@ -23,6 +23,7 @@ const admin_kind admin_crash = {
         "                                 work whose processes died; NAME: the beginning of its key or of its\n"
         "                                 mesh, or the tenant: after three deaths it is refused until cleared\n",
     .values = "crash takes no flags",
+    .takes_ids = 1,
     .verbs = {{"list", 0, 0}, {"clear", 1, 0}},
     .apply = apply,
 };

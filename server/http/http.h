@@ -330,5 +330,8 @@ void note_use(server *srv, const cached *entry);
 enum { REQUEST_FIELDS = 256 };
 void request_fields(const request *r, char out[REQUEST_FIELDS]);
 int64_t clock_us(void);
+/* Whether the service runs on and the client of the request (user) is there. A client that has closed its end for
+ * writing only still gets the answer of work that takes less than a second. For convert_limits and intake_limits. */
+int request_is_wanted(void *user);
 
 #endif

@@ -1,13 +1,12 @@
 /* POST /v1/meshes. The body streams into a temporary file and a hash. Then a thread for checks reads the mesh, repairs
  * it, checks its topology and stores it (intake.h). fetch.c has the form with a URL. */
-#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "http/http.h"
 #include "intake.h"
 
-enum { LOOK_BYTES = 1 << 20, HALF_OPEN_MS = 1000 };
+enum { LOOK_BYTES = 1 << 20 };
 
 static void refuse_full(request *r) {
   reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
@@ -70,18 +69,6 @@ static orb_context *context_for_check(const intake_limits *limits) {
   return orb_context_create(&options, &ctx) == ORB_OK ? ctx : NULL;
 }
 
-/* Whether the service runs on and the client is there. A client that has closed its end for writing only still gets the
- * answer of a check that takes less than HALF_OPEN_MS. */
-static int is_wanted(void *user) {
-  const request *r = user;
-  const union MHD_ConnectionInfo *fd = MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-  struct pollfd look = {.fd = fd ? fd->connect_fd : -1, .events = POLLRDHUP};
-  if (__atomic_load_n(&r->srv->stopping, __ATOMIC_ACQUIRE)) {
-    return 0;
-  }
-  return poll(&look, 1, 0) <= 0 || clock_us() - r->began < 1000 * (int64_t)HALF_OPEN_MS;
-}
-
 /* Other uploads of this tenant have used up the quota. */
 static void refuse_over_quota(request *r) {
   api_problem problem = {0};
@@ -119,7 +106,7 @@ static int store_within(request *r, const intake_file *file, int64_t memory, int
                                 .deadline_ms = orb_clock_ms() + 1000 * srv->options->check_seconds,
                                 .max_triangles = srv->options->max_triangles,
                                 .part = r->away_task.part,
-                                .wanted = is_wanted,
+                                .wanted = request_is_wanted,
                                 .user = r};
   orb_context *ctx = context_for_check(&limits);
   if (!ctx) {
@@ -160,7 +147,9 @@ static int store_within(request *r, const intake_file *file, int64_t memory, int
 /* Checks the file with the memory of the task. If it needs more, waits for all that so many bytes can need. */
 static void store_mesh(request *r, const intake_file *file) {
   memory_budget *memory = r->srv->memory;
-  const int64_t first = r->away_task.memory, most = budget_for_densest_file(memory, BUDGET_CHECKS, r->received);
+  const int fills = (file->upload->options.repair & ORB_REPAIR_FILL_HOLES) != 0;
+  const int64_t first = r->away_task.memory;
+  const int64_t most = budget_for_densest_file(memory, BUDGET_CHECKS, r->received, fills);
   const int64_t kept = r->away_task.part == BUDGET_CHECKS ? first : 0; /* the pool gives this back */
   if (store_within(r, file, first, first >= most)) {
     return;
@@ -205,6 +194,6 @@ enum MHD_Result handle_mesh_file(request *r) {
   const int large = r->received > BUDGET_SMALL_FILE;
   r->away_task.part = large ? BUDGET_CHECKS : BUDGET_SMALL;
   r->away_task.memory = large ? budget_for_file(memory, BUDGET_CHECKS, r->received)
-                              : budget_for_densest_file(memory, BUDGET_SMALL, r->received);
+                              : budget_for_densest_file(memory, BUDGET_SMALL, r->received, 0);
   return request_go_away(r, large ? r->srv->large_checks : r->srv->checks, upload_away);
 }

@@ -1,17 +1,17 @@
-/* Profiles of an asset: made from the stored asset on the first request, once, and kept as objects beside it. */
+/* Profiles of an asset: made from the stored asset on the first request, once, and kept as objects beside it. A process
+ * of its own makes them (convert.h). */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <time.h>
 #include <unistd.h>
 
+#include "convert.h"
 #include "evict.h"
 #include "faults.h"
 #include "http/http.h"
 #include "log.h"
-#include "orbmorph/profile.h"
 #include "store/keys.h"
 #include "store/object_removal.h"
 #include "store/owners.h"
@@ -58,8 +58,22 @@ static const cached *read_again(request *r, store_result *result) {
   return entry;
 }
 
-/* Converts the asset. *out belongs to the context. 1, or 0 with the problem. */
-static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *problem) {
+/* A profile that is made, for the request that makes it and those that wait. */
+typedef struct making {
+  request *r;
+  flight *mine;
+} making;
+
+static int is_wanted(void *user) {
+  const making *m = user;
+  pthread_mutex_lock(&flights.lock);
+  const int others = m->mine->waiting != NULL;
+  pthread_mutex_unlock(&flights.lock);
+  return request_is_wanted(m->r) || (others && !__atomic_load_n(&m->r->srv->stopping, __ATOMIC_ACQUIRE));
+}
+
+/* Converts the asset to a temporary file. 1, or 0 with the problem. */
+static int convert(request *r, orb_context *ctx, const convert_limits *limits, object_temp *out, api_problem *problem) {
   int fd;
   uint64_t size;
   resource row = {0};
@@ -77,43 +91,44 @@ static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *p
                           ? "The server has lost this file. DELETE the resource, then request it again."
                           : "The store could not be read. Try again later; the daemon's log tells the operator why.");
   }
-  void *bytes = size > 0 ? mmap(NULL, (size_t)size, PROT_READ, MAP_PRIVATE, fd, 0) : MAP_FAILED;
+  int fine = convert_asset(r->srv->cat, r->srv->store, ctx, r->id, (orb_profile)r->profile, fd, (int64_t)size,
+                           access_tenant(r), limits, out, problem);
   close(fd);
-  if (bytes == MAP_FAILED) {
-    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  if (!fine && strcmp(problem->name, "cancelled") == 0) {
+    api_refuse(problem, "unavailable",
+               "The server is stopping, or the connection of this request ended; try again soon.");
   }
-  orb_status status = orb_profile_write(ctx, bytes, (size_t)size, (orb_profile)r->profile, NULL, out);
-  munmap(bytes, (size_t)size);
-  if (status != ORB_OK) {
-    api_problem_of_error(orb_context_error(ctx), problem);
-  }
-  return status == ORB_OK;
+  return fine;
 }
 
 enum { LOST_TRIES = 3 };
 
-/* Publishes the object before the row names it. */
-static store_result put_profile(request *r, object_kind kind, const char *sha, const orb_buffer *bytes) {
-  store_result stored = objects_put(r->srv->store, kind, r->id, bytes->data, bytes->size);
-  FAULT_POINT("profile-published");
-  return stored == STORE_OK ? catalogue_add_profile(r->srv->cat, r->id, r->profile - 1, sha, (int64_t)bytes->size)
-                            : stored;
+/* Names the object in the row after it is published. */
+static store_result add_profile(request *r, const char *sha, int64_t bytes) {
+  store_result stored = catalogue_add_profile(r->srv->cat, r->id, r->profile - 1, sha, bytes);
+  for (int i = 0; stored == STORE_LOST && i < LOST_TRIES; i++) {
+    objects_hold_again(r->srv->store);
+    stored = objects_look(r->srv->store, object_of_profile(r->profile - 1), r->id);
+    stored = stored == STORE_OK ? catalogue_add_profile(r->srv->cat, r->id, r->profile - 1, sha, bytes) : STORE_ERROR;
+  }
+  return stored;
 }
 
-static store_result store_profile(request *r, const orb_buffer *bytes) {
+static store_result store_profile(request *r, object_temp *temp, int64_t *bytes) {
   server *srv = r->srv;
   char sha[API_ID_SIZE];
   object_kind kind = object_of_profile(r->profile - 1);
-  if (objects_free_bytes(srv->store) < (uint64_t)bytes->size + (uint64_t)srv->options->disk_reserve) {
+  *bytes = (int64_t)lseek(temp->fd, 0, SEEK_END);
+  if (*bytes < 0 || !verify_hash(temp->fd, sha)) {
+    return STORE_ERROR;
+  }
+  if (objects_free_bytes(srv->store) < (uint64_t)srv->options->disk_reserve) { /* with the temporary file */
     return STORE_FULL;
   }
-  api_id_of_text((const char *)bytes->data, bytes->size, sha);
   objects_hold(srv->store);
-  store_result stored = put_profile(r, kind, sha, bytes);
-  for (int i = 0; stored == STORE_LOST && i < LOST_TRIES; i++) {
-    objects_hold_again(srv->store);
-    stored = put_profile(r, kind, sha, bytes);
-  }
+  store_result stored = objects_publish(srv->store, temp, kind, r->id);
+  FAULT_POINT("profile-published");
+  stored = stored == STORE_OK ? add_profile(r, sha, *bytes) : stored;
   objects_let_go(srv->store);
   if (stored == STORE_NOT_FOUND) {
     evict_unnamed(srv->cat, srv->store, kind, r->id);
@@ -122,15 +137,17 @@ static store_result store_profile(request *r, const orb_buffer *bytes) {
 }
 
 /* 1, or 0 with a response. */
-static int make(request *r) {
+static int make(request *r, flight *mine) {
   const config *options = r->srv->options;
   const int64_t memory = budget_most(r->srv->memory, BUDGET_CHECKS) / 2;
   orb_context_options limits = {
       .memory_limit = (size_t)memory, .threads = 1, .deadline_ms = orb_clock_ms() + 1000 * options->job_seconds};
+  making what = {r, mine};
+  const convert_limits work = {.memory = memory, .deadline_ms = limits.deadline_ms, .wanted = is_wanted, .user = &what};
   orb_context *ctx = NULL;
-  orb_buffer out = {0};
+  object_temp out = {.fd = -1};
   api_problem problem = {0};
-  int64_t began = orb_clock_ms();
+  int64_t began = orb_clock_ms(), bytes = 0;
   if (!sign_may_work(r, &problem)) {
     reply_problem(r, &problem);
     return 0;
@@ -140,9 +157,9 @@ static int make(request *r) {
     return 0;
   }
   budget_wait(r->srv->memory, BUDGET_CHECKS, memory);
-  int fine = convert(r, ctx, &out, &problem);
+  int fine = convert(r, ctx, &work, &out, &problem);
   budget_give(r->srv->memory, BUDGET_CHECKS, memory, NULL);
-  store_result stored = fine ? store_profile(r, &out) : STORE_OK;
+  store_result stored = fine ? store_profile(r, &out, &bytes) : STORE_OK;
   int64_t took = orb_clock_ms() - began;
   if (r->signer) {
     catalogue_key_use(r->srv->cat, r->signer->row.name, (int64_t)time(NULL) / 86400, 0, took);
@@ -151,7 +168,7 @@ static int make(request *r) {
     char fields[REQUEST_FIELDS + 160];
     request_fields(r, fields);
     size_t n = strlen(fields);
-    snprintf(fields + n, sizeof fields - n, ",\"id\":\"%s\",\"bytes\":%zu,\"ms\":%lld", r->id, out.size,
+    snprintf(fields + n, sizeof fields - n, ",\"id\":\"%s\",\"bytes\":%lld,\"ms\":%lld", r->id, (long long)bytes,
              (long long)took);
     log_write(LOG_INFO, fields, "profile %s made", orb_profile_name((orb_profile)r->profile));
     __atomic_add_fetch(&r->srv->profiles_made, 1, __ATOMIC_RELAXED);
@@ -160,7 +177,7 @@ static int make(request *r) {
   } else {
     reply_problem(r, &problem);
   }
-  orb_buffer_free(ctx, &out);
+  objects_abandon(&out);
   orb_context_destroy(ctx);
   return fine && stored == STORE_OK;
 }
@@ -219,7 +236,7 @@ static void profile_away(request *r) {
     if (!take_flight(r, &mine)) {
       return;
     }
-    if (!send_if_stored(r) && make(r) && !send_if_stored(r)) {
+    if (!send_if_stored(r) && make(r, &mine) && !send_if_stored(r)) {
       reply_lost(r);
     }
     land(r, &mine);

@@ -1,13 +1,26 @@
 /* What all handlers share: the clock, and a request's fields in the log. */
+#include <poll.h>
 #include <stdio.h>
 #include <time.h>
 
 #include "http/http.h"
 
+enum { HALF_OPEN_US = 1000000 };
+
 int64_t clock_us(void) {
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+int request_is_wanted(void *user) {
+  const request *r = user;
+  const union MHD_ConnectionInfo *fd = MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  struct pollfd look = {.fd = fd ? fd->connect_fd : -1, .events = POLLRDHUP};
+  if (__atomic_load_n(&r->srv->stopping, __ATOMIC_ACQUIRE)) {
+    return 0;
+  }
+  return poll(&look, 1, 0) <= 0 || clock_us() - r->began < HALF_OPEN_US;
 }
 
 void request_fields(const request *r, char out[REQUEST_FIELDS]) {

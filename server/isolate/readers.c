@@ -109,7 +109,7 @@ void readers_stop(void) {
 
 /* Small files get what the densest of them need. */
 static int64_t memory_of(budget_part part) {
-  return part == BUDGET_SMALL ? budget_for_densest_file(own.memory, part, BUDGET_SMALL_FILE)
+  return part == BUDGET_SMALL ? budget_for_densest_file(own.memory, part, BUDGET_SMALL_FILE, 0)
                               : budget_for_file(own.memory, part, READER_BYTES);
 }
 

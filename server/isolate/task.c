@@ -76,6 +76,15 @@ int task_read_done(const frame *f, done_head *done, char **json, api_problem *pr
   return is_empty || *json;
 }
 
+int task_refuse_store(store_result result, api_problem *problem) {
+  if (result == STORE_FULL) {
+    return api_refuse(problem, "storage-full", "The server's disk is full; free some space and try again.");
+  }
+  return api_refuse(
+      problem, "internal",
+      "The store could not be read or written. Try again later; the daemon's log tells the operator why.");
+}
+
 int64_t task_cpu_seconds(int64_t deadline_ms, int threads) {
   int64_t left = deadline_ms - orb_clock_ms();
   return (left > 0 ? left / 1000 + 2 : 2) * (threads > 0 ? threads : 1);

@@ -5,13 +5,14 @@
 #include "api/mesh_codec.h"
 #include "api/problem.h"
 #include "isolate/isolate.h"
+#include "orbmorph/profile.h"
 #include "store/catalogue.h"
 #include "store/objects.h"
 
-typedef enum task_kind { TASK_CHECK, TASK_EMBEDDING, TASK_SUPERMESH } task_kind;
+typedef enum task_kind { TASK_CHECK, TASK_EMBEDDING, TASK_SUPERMESH, TASK_PROFILE } task_kind;
 
 /* FRAME_TASK. For a job, its request follows, then FRAME_INPUT for each input and FRAME_GO. For a check, the file
- * follows, or its descriptor comes with the frame. */
+ * follows, or its descriptor comes with the frame. For a profile, the descriptor of the asset comes with it. */
 typedef struct task_head {
   task_kind kind;
   int threads, nice;
@@ -21,11 +22,12 @@ typedef struct task_head {
   int64_t memory;      /* bytes: the budget of this task */
   int64_t deadline_ms; /* orb_clock_ms() */
   int64_t max_triangles;
-  char key[API_ID_SIZE]; /* of the job, or the id of the mesh to check */
+  char key[API_ID_SIZE]; /* of the job or the profile, or the id of the mesh to check */
   double embed_ms;
   char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT]; /* of the mesh to check, as the three below */
   orb_repair_options options;
   orb_format format;
+  orb_profile profile; /* of the asset to convert */
   int64_t bytes, created;
 } task_head;
 
@@ -69,6 +71,8 @@ int task_read_done(const frame *f, done_head *done, char **json, api_problem *pr
 /* Reads JSON that a process wrote; the caller frees it with cJSON_Delete(). NULL: it is none, or has more values than
  * any description or refusal. Each would take some 80 bytes of the daemon's memory. */
 cJSON *task_json(const char *text);
+/* Refuses what the store could not do; returns 0. */
+int task_refuse_store(store_result result, api_problem *problem);
 /* A limit on the processor time of a job with this many threads until its deadline. */
 int64_t task_cpu_seconds(int64_t deadline_ms, int threads);
 

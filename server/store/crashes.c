@@ -1,5 +1,6 @@
 #include "store/crashes.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -49,24 +50,32 @@ int catalogue_crashed(catalogue *cat, const char *key) {
   return rows_integer(cat, db, refused(db, key)) > 0;
 }
 
-typedef struct mesh_crash {
-  char mesh[API_ID_SIZE], tenant[64];
+typedef struct other_crash {
+  char key[API_ID_SIZE], tenant[64];
+  char request[API_ID_SIZE + 16]; /* "": the key is a mesh's */
   int64_t now;
-} mesh_crash;
+} other_crash;
 
-static int note_mesh(database *db, void *arg) {
-  const mesh_crash *c = arg;
-  return crash_note(db, c->mesh, NULL, c->tenant, c->now);
+static int note_other(database *db, void *arg) {
+  const other_crash *c = arg;
+  return crash_note(db, c->key, c->request[0] ? c->request : NULL, c->tenant, c->now);
+}
+
+void catalogue_crash_of(catalogue *cat, const char *key, const char *result, const char *tenant, int64_t now) {
+  other_crash *c = calloc(1, sizeof *c);
+  if (c) {
+    strncpy(c->key, key, sizeof c->key - 1);
+    strncpy(c->tenant, tenant, sizeof c->tenant - 1);
+    if (result) {
+      snprintf(c->request, sizeof c->request, "{\"mesh\":\"%s\"}", result);
+    }
+    c->now = now;
+    catalogue_write_later(cat, note_other, c);
+  }
 }
 
 void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenant, int64_t now) {
-  mesh_crash *c = calloc(1, sizeof *c);
-  if (c) {
-    strncpy(c->mesh, mesh, sizeof c->mesh - 1);
-    strncpy(c->tenant, tenant, sizeof c->tenant - 1);
-    c->now = now;
-    catalogue_write_later(cat, note_mesh, c);
-  }
+  catalogue_crash_of(cat, mesh, NULL, tenant, now);
 }
 
 static int clear(database *db, void *arg) {

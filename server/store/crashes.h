@@ -16,12 +16,14 @@ int crash_note(database *db, const char *key, const char *request, const char *t
 /* SQL_OK, or SQL_CONSTRAINT if the work of this key is refused. */
 int crash_check(database *db, const char *key);
 
-/* Counts the death of a process that checked a mesh. Returns without waiting for the commit. */
+/* Counts the death of a process that checked a mesh, or did other work `key` on a result. Returns without waiting for
+ * the commit. */
 void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenant, int64_t now);
+void catalogue_crash_of(catalogue *cat, const char *key, const char *result, const char *tenant, int64_t now);
 /* Whether the work of this key is refused. */
 int catalogue_crashed(catalogue *cat, const char *key);
-/* Forgets the crashes of all keys that begin with `name`, or of the tenant `name`, or of work on the mesh `name`.
- * STORE_NOT_FOUND: there are none. */
+/* Forgets the crashes of all keys that begin with `name`, or of the tenant `name`, or of work on the mesh or result
+ * `name`. STORE_NOT_FOUND: there are none. */
 store_result catalogue_crash_clear(catalogue *cat, const char *name);
 /* Appends a line for each key, the latest first; −1: it cannot be read. */
 int catalogue_crash_list(catalogue *cat, api_text *out);

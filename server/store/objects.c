@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/sendfile.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <time.h>
@@ -256,6 +257,30 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
     objects_abandon(&temp);
   }
   return status;
+}
+
+store_result objects_copy(objects *store, orb_context *ctx, int from, object_temp *temp, int64_t *bytes) {
+  enum { COPY_BYTES = 16 << 20 };
+  struct stat info;
+  if (fstat(from, &info) != 0) {
+    return STORE_ERROR;
+  }
+  store_result stored = objects_begin(store, temp);
+  off_t at = 0;
+  while (stored == STORE_OK && at < info.st_size) {
+    off_t left = info.st_size - at;
+    ssize_t n = sendfile(temp->fd, from, &at, (size_t)(left < COPY_BYTES ? left : COPY_BYTES));
+    if (n == 0) {
+      stored = STORE_ERROR; /* the process has cut it short */
+    } else if (n < 0 && errno != EINTR) {
+      stored = errno == ENOSPC || errno == EDQUOT || errno == EFBIG ? STORE_FULL : STORE_ERROR;
+    } else if (orb_context_check(ctx) != ORB_OK) {
+      stored = STORE_ERROR;
+    }
+    FAULT_POINT("temp-written");
+  }
+  *bytes = (int64_t)at;
+  return stored;
 }
 
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size) {

@@ -16,6 +16,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "orbmorph/context.h"
 #include "store/bucket.h"
 #include "store/object_files.h"
 #include "store/objects_remote.h"
@@ -63,6 +64,10 @@ void objects_let_go(objects *store);
 /* Tells the store that other nodes share its bucket through this lock. The store closes the lock. */
 struct object_lock;
 void objects_share(objects *store, struct object_lock *lock);
+
+/* Begins, and appends all bytes that the file of a descriptor has now, in parts: a process that made it could still
+ * write to it. *bytes: how many. Ends when the context is cancelled or reaches its deadline. */
+store_result objects_copy(objects *store, orb_context *ctx, int from, object_temp *temp, int64_t *bytes);
 
 /* Opens an object for reading; the caller closes *fd. */
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size);

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "convert.h"
 #include "faults.h"
 #include "intake.h"
 #include "isolate/task.h"
@@ -137,6 +138,26 @@ static void check_one(confined *c, const frame *f) {
   api_problem_free(&problem);
 }
 
+_Noreturn static void run_conversion(confined *c, const frame *f) {
+  const objects_remote remote = {publish, read_object, c};
+  objects *store;
+  api_problem problem = {0};
+  done_head done = {0};
+  orb_buffer out = {0};
+  orb_context *ctx = make_context(c, NULL);
+  if (!ctx || objects_open_remote(&remote, &store) != STORE_OK) {
+    _exit(1);
+  }
+  FAULT_POINT("convert-begun");
+  done.fine = convert_here(&c->task, f->fd, ctx, &out, &problem);
+  store_result sent = done.fine ? objects_put(store, OBJECT_ASSET, c->task.key, out.data, out.size) : STORE_OK;
+  if (sent != STORE_OK) {
+    done.fine = task_refuse_store(sent, &problem);
+  }
+  done.bytes = (int64_t)out.size;
+  task_end(c->channel, &done, NULL, &problem);
+}
+
 /* The daemon sent these frames, so what does not fit is a bug: the process ends. */
 static void take_input(confined *c, frame *f) {
   input *in = &c->inputs[c->count++];
@@ -184,6 +205,9 @@ void confined_work(int channel) {
   task_confine(&c.task);
   if (c.task.kind == TASK_CHECK) {
     run_checks(&c, &f);
+  }
+  if (c.task.kind == TASK_PROFILE) {
+    run_conversion(&c, &f);
   }
   c.request = strdup((const char *)f.bytes + sizeof c.task);
   frame_free(&f);

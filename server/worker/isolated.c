@@ -1,22 +1,18 @@
 #include "worker/isolated.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/sendfile.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "api/json.h"
-#include "faults.h"
 #include "isolate/task.h"
 #include "log.h"
 #include "store/alignments.h"
 #include "store/object_removal.h"
 #include "store/verify.h"
 
-enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 2, COPY_BYTES = 16 << 20 };
+enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 2 };
 
 /* Asset, places and spheres. */
 enum { OBJECTS_MOST = 3 };
@@ -129,35 +125,11 @@ static int may_make(api_job_kind kind, object_kind object) {
                                    : object == OBJECT_ASSET || object == OBJECT_PLACES || object == OBJECT_SPHERES;
 }
 
-/* Copies the bytes of a descriptor to a temporary file. The process could still write to the descriptor. */
-static store_result copy(const run_env *env, orb_context *ctx, int from, object_temp *temp, int64_t *bytes) {
-  struct stat info;
-  if (fstat(from, &info) != 0) {
-    return STORE_ERROR;
-  }
-  store_result stored = objects_begin(env->store, temp);
-  off_t at = 0;
-  while (stored == STORE_OK && at < info.st_size) {
-    off_t left = info.st_size - at;
-    ssize_t n = sendfile(temp->fd, from, &at, (size_t)(left < COPY_BYTES ? left : COPY_BYTES));
-    if (n == 0) {
-      stored = STORE_ERROR; /* the process has cut it short */
-    } else if (n < 0 && errno != EINTR) {
-      stored = errno == ENOSPC || errno == EDQUOT || errno == EFBIG ? STORE_FULL : STORE_ERROR;
-    } else if (orb_context_check(ctx) != ORB_OK) {
-      stored = STORE_ERROR;
-    }
-    FAULT_POINT("temp-written");
-  }
-  *bytes = (int64_t)at;
-  return stored;
-}
-
 /* Keeps an alignment, whose row has the hash of its bytes. */
 static void take_alignment(const run_env *env, orb_context *ctx, const char *id, int fd) {
   object_temp temp = {.fd = -1};
   int64_t bytes;
-  if (copy(env, ctx, fd, &temp, &bytes) != STORE_OK ||
+  if (objects_copy(env->store, ctx, fd, &temp, &bytes) != STORE_OK ||
       alignments_publish(env->cat, env->store, id, env->tenant, &temp) != STORE_OK) {
     log_warn("the alignment %s could not be kept", id);
   }
@@ -189,11 +161,11 @@ static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, 
     out->holds = 1;
   }
   object_temp temp = {.fd = -1};
-  store_result stored = copy(env, ctx, f->fd, &temp, &bytes[head.kind]);
+  store_result stored = objects_copy(env->store, ctx, f->fd, &temp, &bytes[head.kind]);
   stored = stored == STORE_OK ? objects_publish(env->store, &temp, head.kind, head.id) : stored;
   objects_abandon(&temp);
   if (stored != STORE_OK && orb_context_check(ctx) == ORB_OK) {
-    run_problem_of_store(stored, problem);
+    task_refuse_store(stored, problem);
   }
   return stored == STORE_OK;
 }

@@ -9,15 +9,6 @@
 #include "worker/run.h"
 #include "worker/sphere.h"
 
-void run_problem_of_store(store_result result, api_problem *problem) {
-  if (result == STORE_FULL) {
-    api_refuse(problem, "storage-full", "The server's disk is full; free some space and try again.");
-  } else {
-    api_refuse(problem, "internal",
-               "The store could not be read or written. Try again later; the daemon's log tells the operator why.");
-  }
-}
-
 store_result run_get(const run_env *env, resource_kind kind, const char *id, resource *out) {
   return env->get ? env->get(env->user, kind, id, out) : catalogue_get(env->cat, kind, id, out);
 }

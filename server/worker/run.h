@@ -7,6 +7,7 @@
 #include "api/mesh_codec.h"
 #include "api/problem.h"
 #include "api/supermesh_codec.h"
+#include "isolate/task.h"
 #include "net/networks.h"
 #include "queue/queue.h"
 #include "worker/progress.h"
@@ -83,7 +84,5 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
  * and the error in the context. */
 int run_place(orb_context *ctx, const orb_mesh *mesh, const api_place *spot, const file_triangle *noted,
               orb_nearest **tree, orb_place *out, const char **why);
-
-void run_problem_of_store(store_result result, api_problem *problem);
 
 #endif

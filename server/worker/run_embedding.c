@@ -24,7 +24,7 @@ static int store_sphere(const run_env *env, orb_context *ctx, const char *key, c
     result->bytes = (int64_t)ply.size;
     store_result stored = objects_put(env->store, OBJECT_SPHERE, key, ply.data, ply.size);
     if (stored != STORE_OK) {
-      run_problem_of_store(stored, problem);
+      task_refuse_store(stored, problem);
       fine = 0;
     }
   }

@@ -55,7 +55,7 @@ static int refuse_url(const api_fetch_request *wish, const char *name, const cha
 static int refuse(const download *d, const api_fetch_request *wish, const net_answer *answer, api_problem *problem) {
   char why[64];
   if (d->stored != STORE_OK) {
-    run_problem_of_store(d->stored, problem);
+    task_refuse_store(d->stored, problem);
     return 0;
   }
   switch (answer->end) {
@@ -132,7 +132,8 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
   } else if (stored == STORE_NOT_FOUND) {
     while (sem_wait(d->options->checks) != 0) { /* interrupted by a signal */
     }
-    const int64_t memory = budget_for_densest_file(d->options->memory, BUDGET_CHECKS, d->size);
+    const int fills = (wish->upload.options.repair & ORB_REPAIR_FILL_HOLES) != 0;
+    const int64_t memory = budget_for_densest_file(d->options->memory, BUDGET_CHECKS, d->size, fills);
     budget_wait(d->options->memory, BUDGET_CHECKS, memory);
     const intake_limits limits = {.memory = memory,
                                   .deadline_ms = orb_clock_ms() + d->options->check_ms,
@@ -152,7 +153,7 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
         (long long)wish->quota);
     api_json_member_integer(&problem->facts, "quota", wish->quota);
   } else if (stored != STORE_OK) {
-    run_problem_of_store(stored, problem);
+    task_refuse_store(stored, problem);
   }
   return stored == STORE_OK && !problem->name && orb_context_check(d->ctx) == ORB_OK;
 }

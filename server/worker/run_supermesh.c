@@ -168,7 +168,7 @@ static int store_places(const run_env *env, orb_context *ctx, const merge_input 
     result->bytes += (int64_t)places.size;
     fine = stored == STORE_OK;
     if (!fine) {
-      run_problem_of_store(stored, problem);
+      task_refuse_store(stored, problem);
     }
   }
   orb_buffer_free(ctx, &places);
@@ -182,7 +182,7 @@ static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_r
   store_result stored = spheres_put(env->store, ctx, result->id, &merged->alignment, &bytes, &status);
   result->bytes += bytes;
   if (stored != STORE_OK && status == ORB_OK) {
-    run_problem_of_store(stored, problem);
+    task_refuse_store(stored, problem);
   }
   return stored == STORE_OK;
 }
@@ -242,7 +242,7 @@ static int store_result_of(const run_env *env, orb_context *ctx, const run_job *
   memcpy(result->id, j->key, sizeof result->id);
   store_result stored = objects_put(env->store, OBJECT_ASSET, result->id, merged->asset.data, merged->asset.size);
   if (stored != STORE_OK) {
-    run_problem_of_store(stored, problem);
+    task_refuse_store(stored, problem);
     return 0;
   }
   if (!store_places(env, ctx, in, merged, result, problem) || !store_spheres(env, ctx, merged, result, problem)) {

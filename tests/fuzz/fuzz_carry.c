@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cost.h"
 #include "format/gltf_add.h"
 #include "format/gltf_given.h"
 #include "format/image.h"
@@ -102,6 +103,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   if (size < 4 || orb_context_create(&options, &ctx) != ORB_OK) {
     return 0;
   }
+  const double began = fuzz_cpu_seconds();
   orb_format format = memcmp(data, "glTF", 4) == 0 ? ORB_FORMAT_GLB : ORB_FORMAT_GLTF;
   if (data[0] == 0x89 || data[0] == 0xff) {
     if (orb_image_decode(ctx, data, size, &pixels) == ORB_OK) {
@@ -110,6 +112,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   } else if (orb_mesh_read(ctx, data, size, format, &mesh, NULL) == ORB_OK) {
     take(ctx, data, size, &mesh);
     orb_mesh_free(ctx, &mesh);
+    fuzz_check_document(ctx, began, size, "carrying");
   }
   if (orb_memory_used(ctx) > 0) {
     abort();

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cost.h"
 #include "format/gltf_given.h"
 #include "format/gltf_keep.h"
 #include "orbmorph/format.h"
@@ -107,11 +108,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   if (size < 1 || orb_context_create(&options, &ctx) != ORB_OK) {
     return 0;
   }
+  const double began = fuzz_cpu_seconds();
   if (orb_mesh_read(ctx, data + 1, size - 1, ORB_FORMAT_GLB, &mesh, NULL) == ORB_OK) {
     keep(ctx, data + 1, size - 1, data[0], &mesh);
     orb_mesh_free(ctx, &mesh);
   }
   must(orb_memory_used(ctx) == 0);
+  fuzz_check_document(ctx, began, size, "unpacking");
   orb_context_destroy(ctx);
   return 0;
 }

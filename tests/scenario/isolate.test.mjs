@@ -219,6 +219,68 @@ function told(pid, signal) {
   }
 }
 
+/**
+ * Asks for a profile of an asset, and sends a signal to the process that makes it. If the profile is made before the
+ * signal arrives, deletes the supermesh, makes it again and tries again.
+ */
+async function convert(d, ids, signal, options) {
+  for (let tries = 0; tries < 20; tries++) {
+    const morph = await d.get(`/v1/morph.glb?shapes=${ids}&align=rotate&remesh=overlay&wait=60`);
+    assert.equal(morph.status, 200, morph.bytes.toString());
+    const url = /\/v1\/supermeshes\/\w+/.exec(morph.headers.get('link'))[0];
+    await until(() => workers(d).length === 0, 'other processes end', 20);
+    const reply = d.get(`${url}/asset.glb?profile=meshopt`, options).catch((error) => error);
+    for (let over = false; !over; ) {
+      const [pid] = workers(d);
+      if (pid && told(pid, signal)) {
+        const ended = await Promise.race([reply.then(() => true), sleep(300)]);
+        if (signal !== 'SIGSTOP' || !ended) return { url, pid, reply };
+      }
+      over = await Promise.race([reply.then(() => true), sleep(1)]);
+    }
+    assert.equal((await reply).status, 200, (await reply).bytes.toString());
+    assert.equal((await d.delete(url)).status, 204);
+  }
+  return assert.fail('no process was seen that makes the profile');
+}
+
+test('a process that dies while it makes a profile leaves a record, and one that hangs ends with its client and the service', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '2'] });
+  const meshes = [];
+  for (const n of [1, 2]) meshes.push((await d.upload(shapes.binaryPly(wobble(n, 5)))).json.id);
+  const ids = meshes.join(',');
+  const admin = async (...args) => (await run(binaries.daemon, ['crash', ...args, '--data', d.data])).stdout;
+  let url;
+  for (const signal of ['SIGSEGV', 'SIGBUS', 'SIGABRT']) {
+    const one = await convert(d, ids, signal);
+    url = one.url;
+    assertProblem(await one.reply, 500, 'job-crashed');
+  }
+  const id = url.split('/').pop();
+  const refused = new RegExp(`^[0-9a-f]{64} crashes=3 refused mesh=${id} tenant= last=`);
+  await until(async () => refused.test(await admin('list')), 'three are counted', 10);
+  const again = await d.get(`${url}/asset.glb?profile=meshopt`);
+  assertProblem(again, 500, 'job-crashed');
+  assert.match(again.json.detail, /Three processes/);
+  assert.equal((await d.get(`${url}/asset.glb`)).status, 200, 'the asset itself is served');
+  assert.equal((await d.get(`${url}/asset.glb?profile=quantized`)).status, 200, 'and other profiles are made');
+  await admin('clear', id);
+
+  const client = new AbortController();
+  const first = await convert(d, ids, 'SIGSTOP', { signal: client.signal });
+  client.abort();
+  await first.reply;
+  await until(() => !workers(d).includes(first.pid), 'the process ends with its client', 4);
+  assert.equal(await admin('list'), '', 'which is no crash');
+
+  const second = await convert(d, ids, 'SIGSTOP');
+  const asked = Date.now();
+  d.child.kill('SIGTERM');
+  await second.reply;
+  assert.equal((await d.exited).code, 0, d.log);
+  assert.ok(Date.now() - asked < 5000 * patience, `it took ${Date.now() - asked} ms to stop`);
+});
+
 test('one process reads small files of one tenant, and none of another', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on', '--workers', '2', '--job-memory', '1G'] });
   const command = async (...args) => (await run(binaries.daemon, [...args, '--data', d.data])).stdout;

@@ -106,6 +106,19 @@ test('safe repairs do not change the shape, and the response lists them', async 
   assert.equal(kinds(cube).triangulate, 6, 'polygons');
 });
 
+test('a small file with a hole of very many edges is checked with the memory that filling it takes', async (t) => {
+  const d = await daemon(t);
+  const edges = 2000;
+  const rim = Array.from({ length: edges }, (_, i) => (2 * Math.PI * i) / edges);
+  const bowl = shapes.binaryPly({
+    positions: [[0, 0, -1], ...rim.map((a) => [Math.cos(a), Math.sin(a), 0])],
+    triangles: rim.map((_, i) => [0, 1 + ((i + 1) % edges), 1 + i]),
+  });
+  const filled = await d.upload(bowl, { repair: 'fill_holes' });
+  assert.equal(filled.status, 201, filled.bytes.toString());
+  assert.ok(filled.json.triangles > 10 * edges, `${filled.json.triangles} triangles`);
+});
+
 test('repairs that change the shape happen only on request', async (t) => {
   const d = await daemon(t);
   const open = obj(shapes.withoutFace(ball(2)));

@@ -329,9 +329,11 @@ static void test_memory_of_files(void **state) {
   memory_budget *memory = budget_create(INT64_C(4) << 30);
   assert_non_null(memory);
   assert_int_equal(budget_for_file(memory, BUDGET_CHECKS, 1000000), (4 << 20) + 9000000);
-  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, 1000000), (4 << 20) + 200000000);
-  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, INT64_C(1) << 60), INT64_C(2) << 30);
-  assert_int_equal(budget_for_densest_file(memory, BUDGET_SMALL, 5000000), (4 << 20) + 1000000000);
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, 1000000, 0), (4 << 20) + 200000000);
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, 1000, 1), (4 << 20) + 200000 + 7200000);
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, 100000, 1), (4 << 20) + 20000000 + (160 << 20));
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, INT64_C(1) << 60, 0), INT64_C(2) << 30);
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_SMALL, 5000000, 0), (4 << 20) + 1000000000);
   budget_destroy(memory);
   /* Two files of load.mjs are checked side by side. */
   memory = budget_create(512 << 20);
