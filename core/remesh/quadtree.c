@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
@@ -43,7 +44,7 @@ static uint64_t edge_key(int32_t a, int32_t b) {
 }
 
 static midpoint *find_slot(const tree *t, uint64_t edge) {
-  uint64_t mask = (uint64_t)t->table_size - 1, i = (edge * 0x9E3779B97F4A7C15u) >> 20;
+  uint64_t mask = (uint64_t)t->table_size - 1, i = orb_hash(t->ctx, &edge, sizeof edge);
   for (;; i++) {
     midpoint *slot = &t->table[i & mask];
     if (slot->edge == edge || slot->edge == 0) {

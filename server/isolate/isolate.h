@@ -1,4 +1,4 @@
-/* Separate processes for all work that reads callers' bytes: the checks of uploads, and jobs.
+/* Separate processes for all work that reads callers' bytes: the checks of uploads, jobs, and profiles of assets.
  *
  * channel.h   the frames that both sides exchange
  * sandbox.h   what such a process may not do
