@@ -59,7 +59,7 @@ async function dropFiles(page, ...paths) {
 
 test('two files that are dropped on the first page morph without a click; a third does not', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  await until(async () => (await countPixels(page, '.hero', vivid)) > 4000, 'a shape is drawn');
+  await page.locator('input[type=file]').first().waitFor({ state: 'attached' });
   await dropFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await defaultShown(page);
   const stage = page.locator('.morph .pane-view');
