@@ -19,6 +19,11 @@ static const double POSTURE_WORSE = 2;
 /* AUTO_UNSURE: a fit that leaves less than this share of the spread is one of a shape to its like, such as two
  * cylinders, whichever parts correspond. Copies leave 0.001, a cow whose head went to a hind leg 0.03. */
 static const double LIKE = 0.01;
+/* AUTO_UNSURE: files have other axes where right angles lie this near to the best rotation, in degrees, leave at most
+ * this share of the spread, and of the squared distances that no rotation leaves. Animals and people whose match is
+ * right but unsure, with z up, have 2° to 13°, 0.02 to 0.11 and 0.02 to 0.17. Matches whose head goes to a leg have 27°
+ * to 41°; where a man stands along the back of a dog, 15° to 19° and 0.16 to 0.2 of the spread. */
+static const double AXES_DEGREES = 15, AXES_OFF = 0.13, AXES_LEFT = 0.25;
 
 /* Weighted points of both shapes. index NULL: all vertices; weight NULL: 1. */
 typedef struct fit_points {
@@ -123,8 +128,8 @@ static void nearest_right_angles(double rotation[3][3], double out[3][3]) {
 
 /* The axes of files differ by right angles. The rest of a rotation, if it is too small to be a difference of frames,
  * comes from the shapes' postures; without it a shape stands as upright as in its file. Copies of one shape fit far
- * worse without the rest, and keep it. If the correspondence may be wrong, the whole rotation may be wrong too. spread:
- * Σ w b·b. */
+ * worse without the rest, and keep it. If the correspondence may be wrong, the whole rotation may be wrong too, unless
+ * it is clearly that of other axes. spread: Σ w b·b. */
 static void drop_posture(double rotation[3][3], double h[3][3], double scale, double spread, orb_fit fit) {
   static const double stay[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   double right[3][3], trace = 0;
@@ -134,7 +139,9 @@ static void drop_posture(double rotation[3][3], double h[3][3], double scale, do
   }
   const double degrees = acos(fmax(-1, fmin(1, (trace - 1) / 2))) * 180 / M_PI;
   const double off = spread - scale * overlap(rotation, h), right_off = spread - scale * overlap(right, h);
-  if (fit == ORB_FIT_AUTO_UNSURE && off > LIKE * spread) {
+  const double stay_off = spread - scale * (h[0][0] + h[1][1] + h[2][2]);
+  const int is_axes = degrees <= AXES_DEGREES && right_off <= AXES_OFF * spread && right_off <= AXES_LEFT * stay_off;
+  if (fit == ORB_FIT_AUTO_UNSURE && off > LIKE * spread && !is_axes) {
     memcpy(rotation, stay, sizeof stay);
   } else if (degrees <= DEGREES_DIFFER && right_off <= POSTURE_WORSE * off) {
     memcpy(rotation, right, sizeof right);

@@ -118,37 +118,43 @@ static void auto_leaves_a_posture(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* A pear, and a wider one, rotated by 50° and three times as large. */
+/* A pear, and a wider one, rotated by these degrees and three times as large. */
+static double mistaken_degrees;
 static void mistaken_copy(int32_t shape, const double p[3], double out[3]) {
   const double q[3] = {p[0] * (1.2 - p[1]), 2 * p[1], p[2] * (1.2 - p[1])};
-  const double turn = shape ? 50 * M_PI / 180 : 0, scale = shape ? 3 : 1, wide = shape ? 1.5 : 1;
+  const double turn = shape ? mistaken_degrees * M_PI / 180 : 0, scale = shape ? 3 : 1, wide = shape ? 1.5 : 1;
   out[0] = scale * wide * (cos(turn) * q[0] - sin(turn) * q[1]);
   out[1] = scale * (sin(turn) * q[0] + cos(turn) * q[1]);
   out[2] = scale * q[2];
 }
 
 /* A match that may be wrong only scales a shape and does not rotate it, unless the shape is a copy of the other one, in
- * any rotation. */
+ * any rotation, or the rotation is that of other axes. */
 static void an_unsure_match_rotates_nothing(void **state) {
   orb_context *ctx = *state;
   static const struct {
     void (*copy)(int32_t shape, const double p[3], double out[3]);
     orb_fit fit;
-    int turns;
-  } cases[] = {
-      {mistaken_copy, ORB_FIT_AUTO, 1}, {mistaken_copy, ORB_FIT_AUTO_UNSURE, 0}, {placed_copy, ORB_FIT_AUTO_UNSURE, 1}};
+    double degrees, least, most;
+  } cases[] = {{mistaken_copy, ORB_FIT_AUTO, 50, 30, 180},
+               {mistaken_copy, ORB_FIT_AUTO_UNSURE, 50, 0, 0},
+               {mistaken_copy, ORB_FIT_AUTO_UNSURE, 84, 90, 90},
+               {mistaken_copy, ORB_FIT_AUTO_UNSURE, 66, 0, 0},
+               {placed_copy, ORB_FIT_AUTO_UNSURE, 50, 30, 180}};
   copy_scale = 3, copy_turn = 50, copy_axis = 2, copy_shift = 0;
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    mistaken_degrees = cases[i].degrees;
     synthetic made = synthetic_make(ctx, 3, 2, cases[i].copy);
     orb_fit_report reports[2];
     double m[32];
     assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, cases[i].fit, m, reports), ORB_OK);
     assert_int_equal(reports[1].kind, ORB_FIT_SIMILARITY);
     assert_true(reports[1].scale > 1 / 4.5 && reports[1].scale < 1 / 2.9);
-    if (cases[i].turns) {
-      assert_true(reports[1].rotation_degrees > 30);
-    } else {
+    if (cases[i].most == 0) {
       assert_true(reports[1].rotation_degrees == 0 && reports[1].up_degrees == 0);
+    } else {
+      assert_true(reports[1].rotation_degrees >= cases[i].least - 1e-6);
+      assert_true(reports[1].rotation_degrees <= cases[i].most + 1e-6);
     }
     synthetic_free(ctx, &made);
   }
