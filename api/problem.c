@@ -177,6 +177,9 @@ static void topology_facts(const orb_error *error, api_text *out) {
       if (error->component_names[i][0]) {
         api_json_member_string(out, "name", error->component_names[i]);
       }
+      if (error->component_nodes[i][0]) {
+        api_json_member_string(out, "node", error->component_nodes[i]);
+      }
       api_json_close(out, '}');
     }
     api_json_close(out, ']');

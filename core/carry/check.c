@@ -146,8 +146,10 @@ static orb_status try_room(orb_context *ctx, const orb_carry_wish *wish) {
   return status;
 }
 
+/* Whether the shape has what an entry names, and, unless the asset is that shape's document, can give it. */
 static orb_status check_one(orb_context *ctx, const orb_carry_wish *wish, int32_t number) {
   const orb_carry *carry = &wish->carries[number];
+  int is_there = wish->document && carry->from == 0;
   const orb_mesh *mesh = wish->given[carry->from].mesh;
   const orb_shape_file *from = &wish->files[carry->from];
   int has = carry->what == ORB_CARRY_TEXTURE    ? orb_texels_has(mesh)
@@ -166,13 +168,19 @@ static orb_status check_one(orb_context *ctx, const orb_carry_wish *wish, int32_
     orb_given_file file = {from->bytes, from->size, mesh->file_vertex_count, used};
     status = orb_carry_blame(ctx, try_document(ctx, carry->what, &file, &has), carry->from, number);
     orb_free(ctx, used);
+    if (is_there && status == ORB_E_BAD_OPTION) {
+      return ORB_OK; /* what cannot be copied, such as several skins, stays in the document all the same */
+    }
   }
   if (status == ORB_OK && !has) {
     return orb_carry_refuse(ctx, wish->carries, number);
   }
-  if (status == ORB_OK && carry->what == ORB_CARRY_TEXTURE) {
+  if (status != ORB_OK || is_there) {
+    return status;
+  }
+  if (carry->what == ORB_CARRY_TEXTURE) {
     status = orb_carry_blame(ctx, try_texture(ctx, wish, mesh), carry->from, number);
-  } else if (status == ORB_OK && carry->what == ORB_CARRY_SKIN && wish->document) {
+  } else if (carry->what == ORB_CARRY_SKIN && wish->document) {
     status = orb_carry_blame(ctx, try_room(ctx, wish), 0, number);
   }
   return status;
@@ -181,9 +189,7 @@ static orb_status check_one(orb_context *ctx, const orb_carry_wish *wish, int32_
 orb_status orb_carry_check(orb_context *ctx, const orb_carry_wish *wish) {
   ORB_TRY(orb_carry_entries(ctx, wish->carries, wish->carry_count, wish->shape_count));
   for (int32_t i = 0; i < wish->carry_count; i++) {
-    if (!(wish->document && wish->carries[i].from == 0)) { /* its document has it */
-      ORB_TRY(check_one(ctx, wish, i));
-    }
+    ORB_TRY(check_one(ctx, wish, i));
   }
   return ORB_OK;
 }

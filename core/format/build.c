@@ -251,6 +251,23 @@ static size_t sequence(const unsigned char *p, size_t left) {
   return bad ? 0 : n;
 }
 
+static void copy_name(const unsigned char *name, size_t length, char out_name[ORB_PART_NAME]) {
+  for (size_t at = 0, out = 0; at < length;) {
+    size_t n = sequence(name + at, length - at);
+    if (out + (n ? n : 1) >= ORB_PART_NAME) {
+      break;
+    }
+    if (n == 0 || name[at] < 0x20 || name[at] == 0x7f) {
+      out_name[out++] = '?';
+      at++;
+      continue;
+    }
+    memcpy(out_name + out, name + at, n);
+    out += n;
+    at += n;
+  }
+}
+
 orb_status orb_build_object(orb_build *build, const unsigned char *name, size_t length) {
   if (build->object_count > 0 && build->objects[build->object_count - 1].first_triangle == build->triangles) {
     build->object_count--; /* it has no faces */
@@ -269,19 +286,12 @@ orb_status orb_build_object(orb_build *build, const unsigned char *name, size_t 
       orb_build_grow(build->ctx, &build->objects, &build->object_room, build->object_count + 1, sizeof(orb_object)));
   orb_object *object = &build->objects[build->object_count++];
   *object = (orb_object){.first_triangle = (int32_t)build->triangles};
-  for (size_t at = 0, out = 0; at < length;) {
-    size_t n = sequence(name + at, length - at);
-    if (out + (n ? n : 1) >= sizeof object->name) {
-      break;
-    }
-    if (n == 0 || name[at] < 0x20 || name[at] == 0x7f) {
-      object->name[out++] = '?';
-      at++;
-      continue;
-    }
-    memcpy(object->name + out, name + at, n);
-    out += n;
-    at += n;
-  }
+  copy_name(name, length, object->name);
   return ORB_OK;
+}
+
+void orb_build_object_node(orb_build *build, const unsigned char *name, size_t length) {
+  if (build->object_count > 0 && build->object_count <= ORB_OBJECTS_MAX) {
+    copy_name(name, length, build->objects[build->object_count - 1].node);
+  }
 }

@@ -71,6 +71,8 @@ ORB_MUST_CHECK orb_status orb_build_use_material(orb_build *build, const unsigne
 
 /* The faces to come belong to an object of this name. */
 ORB_MUST_CHECK orb_status orb_build_object(orb_build *build, const unsigned char *name, size_t length);
+/* The node that shows the object last added. */
+void orb_build_object_node(orb_build *build, const unsigned char *name, size_t length);
 
 /* Notes what the file has and the mesh does not; see orb_dropped_add(). */
 ORB_MUST_CHECK orb_status orb_build_drop(orb_build *build, const char *what, const char *where, const char *why);

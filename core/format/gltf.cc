@@ -161,6 +161,14 @@ struct Reader {
     }
   }
 
+  /* The faces to come are a mesh as a node shows it. at: NULL if none does. */
+  void begin_object(size_t mesh, const Shown *at) {
+    const std::string name = text_of(meshes[mesh], "name"), node = at ? text_of(at->node, "name") : "";
+    const std::string &title = name.empty() ? node : name;
+    must(orb_build_object(&build, reinterpret_cast<const unsigned char *>(title.data()), title.size()));
+    orb_build_object_node(&build, reinterpret_cast<const unsigned char *>(node.data()), node.size());
+  }
+
   void read(Bytes chunk, orb_mesh *out) {
     if (!cJSON_IsObject(doc) || text_of(member(doc, "asset"), "version").compare(0, 2, "2.") != 0) {
       malformed("The file is not glTF 2.0.");
@@ -170,11 +178,11 @@ struct Reader {
     materials.load(doc);
     build.by_vertex = 1;
     build.texcoords_v_down = 1;
-    std::vector<std::pair<int64_t, Matrix>> shown = shown_meshes(doc, meshes.size());
+    const std::vector<Shown> shown = shown_meshes(doc, meshes.size());
     std::vector<int64_t> first(meshes.size(), NONE);
     for (size_t i = 0; i < shown.size(); i++) {
-      (void)element(meshes, shown[i].first, "mesh");
-      int64_t &at = first[static_cast<size_t>(shown[i].first)];
+      (void)element(meshes, shown[i].mesh, "mesh");
+      int64_t &at = first[static_cast<size_t>(shown[i].mesh)];
       at = at == NONE ? static_cast<int64_t>(i) : at;
     }
     bool normals = false, texcoords = false; /* if any triangle primitive has them, all get them */
@@ -183,26 +191,25 @@ struct Reader {
       normals |= member(attributes, "NORMAL") != nullptr;
       texcoords |= member(attributes, texcoord_of(primitive).c_str()) != nullptr;
     });
-    auto add = [&](size_t mesh, const Matrix &matrix, bool visible) {
-      std::string name = text_of(meshes[mesh], "name");
-      must(orb_build_object(&build, reinterpret_cast<const unsigned char *>(name.data()), name.size()));
+    auto add = [&](size_t mesh, const Shown *at) {
+      begin_object(mesh, at);
       blaming({culprit("meshes", meshes, mesh)}, [&] {
         for (const cJSON *primitive : array_of(meshes[mesh], "primitives")) {
           if (!cJSON_IsObject(primitive)) {
             malformed("A glTF primitive is not an object.");
           }
           buffers.spend(WORK_OF_PRIMITIVE);
-          add_primitive(primitive, matrix, visible, normals, texcoords);
+          add_primitive(primitive, at ? at->matrix : Matrix(), at != nullptr, normals, texcoords);
           must(orb_context_check(ctx));
         }
       });
     };
     for (size_t i = 0; i < meshes.size(); i++) {
-      add(i, first[i] == NONE ? Matrix() : shown[static_cast<size_t>(first[i])].second, first[i] != NONE);
+      add(i, first[i] == NONE ? nullptr : &shown[static_cast<size_t>(first[i])]);
     }
     for (size_t i = 0; i < shown.size(); i++) {
-      if (first[static_cast<size_t>(shown[i].first)] != static_cast<int64_t>(i)) {
-        add(static_cast<size_t>(shown[i].first), shown[i].second, true);
+      if (first[static_cast<size_t>(shown[i].mesh)] != static_cast<int64_t>(i)) {
+        add(static_cast<size_t>(shown[i].mesh), &shown[i]);
       }
     }
     note_dropped();

@@ -29,17 +29,17 @@ std::vector<Block> blocks_of(const cJSON *doc) {
   std::vector<const Matrix *> matrix(meshes.size(), nullptr);
   std::vector<bool> again(shown.size(), false);
   for (size_t i = 0; i < shown.size(); i++) {
-    (void)element(meshes, shown[i].first, "mesh");
-    const Matrix *&at = matrix[static_cast<size_t>(shown[i].first)];
+    (void)element(meshes, shown[i].mesh, "mesh");
+    const Matrix *&at = matrix[static_cast<size_t>(shown[i].mesh)];
     again[i] = at != nullptr;
-    at = at ? at : &shown[i].second;
+    at = at ? at : &shown[i].matrix;
   }
   for (size_t m = 0; m < meshes.size(); m++) {
     add(m, matrix[m] ? *matrix[m] : Matrix());
   }
   for (size_t i = 0; i < shown.size(); i++) {
     if (again[i]) {
-      add(static_cast<size_t>(shown[i].first), shown[i].second);
+      add(static_cast<size_t>(shown[i].mesh), shown[i].matrix);
     }
   }
   return out;

@@ -10,14 +10,14 @@ namespace gltf {
 
 namespace {
 
-const double EXACT = 9007199254740992; /* 2⁵³: whole numbers below have all their digits */
-
 size_t padding(size_t size) {
   return (4 - size % 4) % 4;
 }
 
 void write_value(orb_glb_writer *w, const cJSON *item) {
-  if (cJSON_IsString(item)) {
+  if (cJSON_IsRaw(item)) { /* see keep_digits() */
+    orb_glb_text(w, item->valuestring);
+  } else if (cJSON_IsString(item)) {
     orb_glb_quoted(w, "", item->valuestring);
   } else if (cJSON_IsNumber(item)) {
     double value = item->valuedouble;

@@ -110,7 +110,7 @@ struct Keeper {
     auto shown = shown_meshes(doc, meshes.size());
     showed.assign(meshes.size(), 0);
     matrix.assign(meshes.size(), Matrix());
-    for (const auto &[mesh, at] : shown) {
+    for (const auto &[mesh, at, node] : shown) {
       (void)element(meshes, mesh, "mesh");
       if (showed[static_cast<size_t>(mesh)]++ == 0) {
         matrix[static_cast<size_t>(mesh)] = at;
@@ -126,7 +126,8 @@ struct Keeper {
     }
     kept->vertex_count = static_cast<int32_t>(next);
     std::vector<bool> seen(meshes.size(), false);
-    for (const auto &[mesh, at] : shown) { /* the copies of a mesh come after all meshes, in the order of the nodes */
+    for (const auto &[mesh, at, node] :
+         shown) { /* the copies of a mesh come after all meshes, in the order of the nodes */
       size_t m = static_cast<size_t>(mesh), size = size_of(m);
       if (seen[m]) {
         if (next + size > static_cast<size_t>(shapes.file_vertex_count)) {

@@ -35,6 +35,69 @@ size_t count_values(const unsigned char *text, size_t size) {
   return count;
 }
 
+/* The next number of a JSON text from *at on; numbers are outside strings. */
+std::string next_number(Bytes text, size_t *at) {
+  bool quoted = false;
+  for (; *at < text.size; ++*at) {
+    unsigned char c = text.at[*at];
+    if (quoted) {
+      *at += c == '\\';
+      quoted = c != '"';
+    } else if (c == '-' || (c >= '0' && c <= '9')) {
+      break;
+    } else {
+      quoted = c == '"';
+    }
+  }
+  size_t begin = *at;
+  while (*at < text.size && text.at[*at] && std::strchr("0123456789+-.eE", text.at[*at])) {
+    ++*at;
+  }
+  return {reinterpret_cast<const char *>(text.at) + begin, *at - begin};
+}
+
+/* Whether orbmorph gives a member no meaning: extras, and extensions that are nobody's standard. */
+bool is_foreign(const cJSON *item, const cJSON *above) {
+  auto begins = [&](const char *prefix) { return std::strncmp(item->string, prefix, 4) == 0; };
+  return item->string &&
+         (std::strcmp(item->string, "extras") == 0 ||
+          (above->string && std::strcmp(above->string, "extensions") == 0 && !begins("KHR_") && !begins("EXT_")));
+}
+
+/* cJSON parses numbers as doubles. The whole numbers of foreign members that lose digits, such as 64-bit ids, become
+ * raw text, which the writer copies. Numbers come in one order in the tree and in the text. */
+void keep_digits(cJSON *doc, Bytes text) {
+  std::vector<cJSON *> above;     /* at most as deep as cJSON parses, 1,000 */
+  const cJSON *foreign = nullptr; /* the outermost such member around the item */
+  size_t at = 0;
+  for (cJSON *item = doc; item;) {
+    if (cJSON_IsNumber(item)) {
+      const std::string digits = next_number(text, &at);
+      bool is_free = foreign || (!above.empty() && is_foreign(item, above.back()));
+      if (is_free && std::fabs(item->valuedouble) >= EXACT && digits.find_first_of(".eE") == std::string::npos) {
+        item->valuestring = static_cast<char *>(cJSON_malloc(digits.size() + 1));
+        if (!item->valuestring) {
+          throw std::bad_alloc();
+        }
+        std::memcpy(item->valuestring, digits.c_str(), digits.size() + 1);
+        item->type = cJSON_Raw;
+      }
+    }
+    if (item->child) {
+      foreign = !foreign && !above.empty() && is_foreign(item, above.back()) ? item : foreign;
+      above.push_back(item);
+      item = item->child;
+      continue;
+    }
+    while (!item->next && !above.empty()) {
+      item = above.back();
+      above.pop_back();
+      foreign = foreign == item ? nullptr : foreign;
+    }
+    item = above.empty() ? nullptr : item->next;
+  }
+}
+
 /* Refuses objects whose look-ups would cost too much. The reader does not look into "extras", and looks into
  * "extensions" only once. */
 void check_members(const cJSON *doc) {
@@ -127,6 +190,7 @@ Document::Document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
     throw Passed{ORB_E_MALFORMED_MESH};
   }
   check_members(root_.get());
+  keep_digits(root_.get(), text);
 }
 
 orb_status status_of_exception(orb_context *ctx, size_t size) {

@@ -53,9 +53,10 @@ int64_t number_of(const cJSON *value) {
   return static_cast<int64_t>(value->valuedouble);
 }
 
-std::vector<std::pair<int64_t, Matrix>> shown_meshes(const cJSON *doc, size_t mesh_count) {
+std::vector<Shown> shown_meshes(const cJSON *doc, size_t mesh_count) {
   const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");
-  std::vector<std::pair<int64_t, Matrix>> stack, out;
+  std::vector<std::pair<int64_t, Matrix>> stack;
+  std::vector<Shown> out;
   if (!scenes.empty()) {
     const cJSON *scene = element(scenes, whole(doc, "scene", 0), "scene");
     for (const cJSON *root : array_of(scene, "nodes")) {
@@ -78,7 +79,7 @@ std::vector<std::pair<int64_t, Matrix>> shown_meshes(const cJSON *doc, size_t me
     }
   } else {
     for (size_t i = 0; i < mesh_count; i++) {
-      out.emplace_back(static_cast<int64_t>(i), Matrix());
+      out.push_back(Shown{static_cast<int64_t>(i), Matrix(), nullptr});
     }
   }
   std::vector<bool> seen(nodes.size(), false);
@@ -94,7 +95,7 @@ std::vector<std::pair<int64_t, Matrix>> shown_meshes(const cJSON *doc, size_t me
     Matrix matrix = above * matrix_of(node);
     int64_t mesh = whole(node, "mesh", NONE);
     if (mesh != NONE) {
-      out.emplace_back(mesh, matrix);
+      out.push_back(Shown{mesh, matrix, node});
     }
     const List children = array_of(node, "children");
     for (size_t i = children.size(); i-- > 0;) {

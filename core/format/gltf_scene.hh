@@ -56,9 +56,16 @@ Matrix matrix_of(const cJSON *node);
 /* The number of a node in a list of them. */
 int64_t number_of(const cJSON *value);
 
-/* Mesh number and matrix of each node of the scene that shows a mesh, in depth-first order from the roots. Without
- * nodes and scenes: each of the mesh_count meshes once. */
-std::vector<std::pair<int64_t, Matrix>> shown_meshes(const cJSON *doc, size_t mesh_count);
+/* A mesh as a node of the scene shows it. */
+struct Shown {
+  int64_t mesh;
+  Matrix matrix;
+  const cJSON *node; /* NULL: no node shows it */
+};
+
+/* Each node of the scene that shows a mesh, in depth-first order from the roots. Without nodes and scenes: each of the
+ * mesh_count meshes once. */
+std::vector<Shown> shown_meshes(const cJSON *doc, size_t mesh_count);
 
 }  // namespace gltf
 

@@ -18,6 +18,8 @@
 
 namespace gltf {
 
+const double EXACT = 9007199254740992; /* 2⁵³: whole numbers below have all their digits */
+
 using List = std::vector<const cJSON *>;
 
 const size_t NOWHERE = SIZE_MAX; /* the index of a part that the document does not have */

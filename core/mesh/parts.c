@@ -67,12 +67,21 @@ const char *orb_part_name(const orb_mesh *mesh, const orb_part *part) {
   return part->object < 0 ? "" : mesh->objects[part->object].name;
 }
 
+const char *orb_part_node(const orb_mesh *mesh, const orb_part *part) {
+  return part->object < 0 ? "" : mesh->objects[part->object].node;
+}
+
 int32_t orb_parts_find(const orb_mesh *mesh, const orb_parts *parts, const orb_repair_options *options) {
   if (!options->part_name[0]) {
     return options->part >= 0 && options->part < parts->count ? options->part : -1;
   }
   for (int32_t i = 0; i < parts->count; i++) {
     if (strcmp(orb_part_name(mesh, &parts->part[i]), options->part_name) == 0) {
+      return i;
+    }
+  }
+  for (int32_t i = 0; i < parts->count; i++) {
+    if (strcmp(orb_part_node(mesh, &parts->part[i]), options->part_name) == 0) {
       return i;
     }
   }

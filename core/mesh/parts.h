@@ -22,6 +22,9 @@ ORB_MUST_CHECK orb_status orb_parts_list(orb_surface *surface, orb_parts *out);
 /* "" where the file has no name. */
 const char *orb_part_name(const orb_mesh *mesh, const orb_part *part);
 
+/* The name of the node that shows its mesh (glTF), or "". */
+const char *orb_part_node(const orb_mesh *mesh, const orb_part *part);
+
 /* The index of the part that the options name, −1: there is none. */
 int32_t orb_parts_find(const orb_mesh *mesh, const orb_parts *parts, const orb_repair_options *options);
 

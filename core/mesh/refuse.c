@@ -112,15 +112,75 @@ orb_status orb_refuse_facing(orb_surface *s) {
   return status;
 }
 
+static void list_parts(orb_surface *s, const orb_parts *parts) {
+  orb_error *error = orb_context_error_edit(s->ctx);
+  error->component_total = parts->count;
+  for (int32_t i = 0; i < parts->count && i < ORB_ERROR_ITEMS; i++) {
+    snprintf(error->component_names[error->component_count], ORB_PART_NAME, "%s",
+             orb_part_name(s->mesh, &parts->part[i]));
+    snprintf(error->component_nodes[error->component_count], ORB_PART_NAME, "%s",
+             orb_part_node(s->mesh, &parts->part[i]));
+    error->components[error->component_count++] = parts->part[i].triangles;
+  }
+}
+
+/* The first part without an open edge, so the largest; −1: there is none. closed: scratch, per piece. */
+static int32_t find_closed(const orb_surface *s, const orb_parts *parts, unsigned char *closed) {
+  memset(closed, 1, (size_t)s->piece_count);
+  for (int32_t h = 0; h < 3 * s->mesh->triangle_count; h++) {
+    closed[s->piece[h / 3]] &= s->twin[h] != ORB_OPEN;
+  }
+  for (int32_t i = 0; i < parts->count; i++) {
+    if (closed[parts->part[i].piece]) {
+      return i;
+    }
+  }
+  return -1;
+}
+
+/* What to do besides closing the holes. If the largest piece has none, such as a body beside open clothes, nothing has
+ * to be filled. whole: the largest piece without holes; −1: there is none. */
+static void advise_open(const orb_mesh *mesh, const orb_parts *parts, int32_t whole, char *advice, size_t size) {
+  const char *name = whole < 0 ? "" : orb_part_name(mesh, &parts->part[whole]);
+  if (parts->count < 2) {
+    snprintf(advice, size, "repair=fill_holes");
+  } else if (whole == 0) {
+    snprintf(advice, size, "repair=largest_component: the largest of its %d pieces has no holes", parts->count);
+  } else {
+    int used =
+        snprintf(advice, size, "repair=fill_holes, and with largest_component or part=K to keep one of its %d pieces",
+                 parts->count);
+    if (whole > 0) {
+      snprintf(advice + used, size - (size_t)used, "; piece %d%s%s%s has no holes", whole, name[0] ? ", \"" : "", name,
+               name[0] ? "\"," : "");
+    }
+  }
+}
+
 orb_status orb_refuse_open(orb_surface *s) {
   int64_t loops = 0;
+  char advice[160 + ORB_PART_NAME];
+  orb_parts parts = {0};
   ORB_TRY(orb_surface_loops(s, &loops));
+  ORB_TRY(orb_parts_list(s, &parts));
+  unsigned char *closed = ORB_NEW(s->ctx, unsigned char, s->piece_count);
+  if (!closed) {
+    orb_free(s->ctx, parts.part);
+    return ORB_E_NO_MEMORY;
+  }
+  advise_open(s->mesh, &parts, find_closed(s, &parts, closed), advice, sizeof advice);
   (void)orb_fail(
       s->ctx, ORB_E_NOT_CLOSED,
       "The surface is not closed: %lld %s in %lld boundary %s %s a face on one side only. Close %s, or send the "
-      "mesh with repair=fill_holes.",
+      "mesh with %s.",
       (long long)s->edges.open, plural(s->edges.open, "edge", "edges"), (long long)loops,
-      plural(loops, "loop", "loops"), plural(s->edges.open, "has", "have"), plural(loops, "the hole", "the holes"));
+      plural(loops, "loop", "loops"), plural(s->edges.open, "has", "have"), plural(loops, "the hole", "the holes"),
+      advice);
+  if (parts.count > 1) {
+    list_parts(s, &parts);
+  }
+  orb_free(s->ctx, parts.part);
+  orb_free(s->ctx, closed);
   orb_error *error = orb_context_error_edit(s->ctx);
   error->boundary_loops = loops;
   error->edge_total = s->edges.open;
@@ -130,16 +190,6 @@ orb_status orb_refuse_open(orb_surface *s) {
     }
   }
   return ORB_E_NOT_CLOSED;
-}
-
-static void list_parts(orb_surface *s, const orb_parts *parts) {
-  orb_error *error = orb_context_error_edit(s->ctx);
-  error->component_total = parts->count;
-  for (int32_t i = 0; i < parts->count && i < ORB_ERROR_ITEMS; i++) {
-    snprintf(error->component_names[error->component_count], ORB_PART_NAME, "%s",
-             orb_part_name(s->mesh, &parts->part[i]));
-    error->components[error->component_count++] = parts->part[i].triangles;
-  }
 }
 
 orb_status orb_refuse_part(orb_surface *s, const orb_parts *parts, const orb_repair_options *options) {

@@ -195,6 +195,56 @@ test('handles are closed up to a size, and shown beyond it', async (t) => {
   assertProblem(await d.upload(ring, { repair: 'close_handles', handle_size: 0 }), 400, 'bad-query');
 });
 
+test('a piece of a glTF file has the name of its mesh, and that of its node', async (t) => {
+  const d = await daemon(t);
+  const pair = (name) =>
+    writeGlb({
+      ...ball(2),
+      edit: (gltf) => {
+        if (name) gltf.meshes[0].name = name;
+        gltf.nodes = [
+          { name: 'left', mesh: 0 },
+          { name: 'right', mesh: 0, translation: [5, 0, 0] },
+        ];
+        gltf.scenes[0].nodes = [0, 1];
+      },
+    });
+  const pieces = async (file) => (await d.upload(file)).json.parts.map(({ name, node }) => [name, node]);
+  assert.deepEqual(await pieces(pair('eye')), [
+    ['eye', 'left'],
+    ['eye', 'right'],
+  ]);
+  assert.deepEqual(await pieces(pair()), [
+    ['left', 'left'],
+    ['right', 'right'],
+  ]);
+  const right = await d.upload(pair('eye'), { part: 'right' });
+  assert.equal(right.status, 201, right.bytes.toString());
+  assert.ok(right.json.bounds.min[0] > 3);
+  const first = await d.upload(pair('eye'), { part: 'eye' });
+  assert.ok(first.json.bounds.max[0] < 2, 'of equal pieces the first');
+});
+
+test('open pieces beside a closed one need no filling', async (t) => {
+  const d = await daemon(t);
+  const advice = async (...parts) => {
+    const reply = await d.upload(obj(shapes.apart(...parts)));
+    assertProblem(reply, 422, 'not-closed');
+    return [reply.json.detail, reply.json.components];
+  };
+  const [body, sizes] = await advice(ball(2), shapes.withoutFace(ball(1)));
+  assert.match(body, /mesh with repair=largest_component: the largest of its 2 pieces has no holes\.$/);
+  assert.deepEqual(sizes, [128, 31]);
+  assert.match(
+    (await advice(shapes.withoutFace(ball(2)), ball(1)))[0],
+    /repair=fill_holes, and with largest_component or part=K to keep one of its 2 pieces; piece 1 has no holes\.$/,
+  );
+  assert.match(
+    (await advice(shapes.withoutFace(ball(2)), shapes.withoutFace(ball(1))))[0],
+    /repair=fill_holes, and with largest_component or part=K to keep one of its 2 pieces\.$/,
+  );
+});
+
 test('a refusal of a bad mesh says what is wrong and where', async (t) => {
   const d = await daemon(t);
   const m = ball(2);

@@ -155,6 +155,35 @@ for (const [kind, write] of [
     assert.ok(inward < points.length / 20, `${inward} normals face inwards`);
   });
 
+test('whole numbers of extras and foreign extensions keep all digits', async (t) => {
+  const d = await daemon(t);
+  const ids = ['12345678901234567', '-9223372036854775807', '18446744073709551615', '9007199254740993'];
+  const bytes = writeGlb({
+    ...shapes.egg(2),
+    edit: (gltf) => {
+      gltf.extras = { tags: '[-1,"id0"]', list: ['ID0', 0.1, 7], one: 'ID1' };
+      gltf.nodes[0].extras = 'ID2';
+      gltf.extensions = { ACME_ids: { deep: [{ of: 'ID3' }] } };
+      gltf.extensionsUsed = ['ACME_ids'];
+    },
+  });
+  const json = bytes.toString('latin1', 20, 20 + bytes.readUInt32LE(12));
+  const numbers = json.replace(/"ID(\d)"/g, (_, k) => ids[k]).trimEnd();
+  assert.ok(ids.every((id) => numbers.includes(id)));
+  const binary = binaryOf(bytes).toString('base64'); // a glTF, which has no lengths to correct
+  const text = numbers.replace(/"buffers":\[\{/, `"buffers":[{"uri":"data:application/octet-stream;base64,${binary}",`);
+  const made = await d.made('/v1/supermeshes', await merge(d, Buffer.from(text), { name: 'egg' }, [shapes.bean(2)]));
+  const asset = (await d.get(made.asset)).bytes;
+  const after = asset.toString('utf8', 20, 20 + asset.readUInt32LE(12));
+  assert.deepEqual(JSON.parse(after).extras, JSON.parse(numbers).extras);
+  for (const part of [
+    `"list":[${ids[0]},0.1,7],"one":${ids[1]}`,
+    `"extras":${ids[2]}`,
+    `"ACME_ids":{"deep":[{"of":${ids[3]}}]}`,
+  ])
+    assert.ok(after.includes(part), part);
+});
+
 test('a mesh that the scene shows twice is refused', async (t) => {
   const d = await daemon(t);
   const twice = (gltf) => {

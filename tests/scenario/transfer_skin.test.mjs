@@ -226,6 +226,22 @@ test('the own skin and targets of the first shape, on a new mesh', async (t) => 
   assert.equal((await d.get(`${targets.asset}?profile=meshopt`)).status, 200);
 });
 
+test('a kept document must have what an entry of the first shape names', async (t) => {
+  const d = await daemon(t);
+  const body = await uploaded(d, rigged().bytes, { name: 'body', repair: 'largest_component' });
+  const egg = await uploaded(d, shapes.obj(shapes.egg(3)), { name: 'egg' });
+  const plain = await uploaded(d, writeGlb(shapes.egg(3)), { name: 'plain' });
+  const remesh = { method: 'template' };
+  const transfer = ['skin', 'targets'].map((what) => ({ from: 0, what }));
+  const made = await d.made('/v1/supermeshes', { shapes: [body, egg], remesh, asset, transfer });
+  assert.deepEqual(made.transferred, [], 'the document has them');
+  for (const one of transfer) {
+    const { problem } = await d.make('/v1/supermeshes', { shapes: [plain, egg], remesh, asset, transfer: [one] });
+    assert.match(problem.detail, /from shape 0, which has no/);
+    assert.equal(problem.transfer, 0);
+  }
+});
+
 test('targets of equal names get a number', async (t) => {
   const d = await daemon(t);
   const body = await uploaded(d, rigged().bytes, { name: 'body', repair: 'largest_component' });

@@ -1136,8 +1136,10 @@ export type ProblemNotConnected = {
 export type Parts = Array<{
   part: number;
   triangles: number;
-  /** Of the object of the file that most of its triangles belong to. */
+  /** Of the object (OBJ) or mesh (glTF) that most of its triangles belong to. A mesh without a name has that of its node. */
   name?: string;
+  /** glTF: the node that shows that mesh. The parameter `part` takes this name too. */
+  node?: string;
 }>;
 
 export type ProblemNotGenusZero = {

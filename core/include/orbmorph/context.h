@@ -57,6 +57,7 @@ typedef struct orb_error {
   double loop_length_relative[ORB_ERROR_LOOPS]; /* to the diagonal */
   int32_t loop_vertices[ORB_ERROR_LOOP_VERTICES];
   char component_names[ORB_ERROR_ITEMS][128]; /* of `components`; "": the file gives none */
+  char component_nodes[ORB_ERROR_ITEMS][128]; /* of `components`: glTF nodes */
 } orb_error;
 
 /* Called with the stage ("simplify", "embed", …) and the fraction of that stage that is done, 0 to 1. Any thread of the

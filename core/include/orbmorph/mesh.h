@@ -37,6 +37,8 @@ enum { ORB_PART_NAME = 128 };
 typedef struct orb_object {
   int32_t first_triangle;   /* numbers of the file */
   char name[ORB_PART_NAME]; /* UTF-8 without control characters; longer names are cut */
+  char node[ORB_PART_NAME]; /* glTF: the name of the node that shows the mesh; it is also the name of a mesh without one
+                             */
 } orb_object;
 
 /* In source_triangle, for a triangle that a repair made: FILL fills a hole of the file, COVER closes what another
@@ -147,7 +149,8 @@ typedef struct orb_repair_options {
   double handle_size; /* handles are closed along loops of at most this length, relative to the diagonal; 0: 0.05 */
   int32_t part;       /* with ORB_REPAIR_PART: pieces are numbered by their triangles, the largest is 0 */
   char part_name[ORB_PART_NAME]; /* unless "": the largest piece with this name, instead of a number. A piece has the
-                                  * name of the object that most of its triangles belong to */
+                                  * name of the object that most of its triangles belong to. If no piece has the name,
+                                  * the largest one whose node has it */
 } orb_repair_options;
 
 /* The same with options. */
