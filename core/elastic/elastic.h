@@ -61,7 +61,7 @@ ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a
 
 /* Slides mesh a over mesh b until the two fit each other in space, from where a map takes its vertices. A map of little
  * energy knows lengths only; a slide knows bumps and hollows as well. Both meshes are as in orb_elastic_register().
- * Changes the positions, 3 per vertex. O(n · m) a round, 10 rounds. On all threads. */
+ * Changes the positions, 3 per vertex. O(n · m) a round, 10 to 40 rounds, as long as it moves. On all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_slide(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                             const orb_elastic_anchors *anchors, double *position);
 

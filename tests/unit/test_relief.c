@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "elastic/elastic.h"
 #include "elastic/relief.h"
 #include "numeric/vec3.h"
@@ -42,7 +43,7 @@ static orb_relief relief_of(const orb_mesh *mesh, orb_body *body) {
   orb_relief relief = {0};
   *body = (orb_body){0};
   assert_int_equal(orb_body_create(ctx, mesh, body), ORB_OK);
-  assert_int_equal(orb_relief_create(ctx, body, orb_relief_grain(body, body), 1, &relief), ORB_OK);
+  assert_int_equal(orb_relief_create(ctx, body, orb_relief_grain(body, body), &relief), ORB_OK);
   return relief;
 }
 
@@ -110,8 +111,8 @@ static void relief_does_not_depend_on_triangles(void **state) {
   assert_int_equal(orb_body_create(ctx, &fine, &body[1]), ORB_OK);
   const double grain = orb_relief_grain(&body[0], &body[1]);
   double most = 0, off = 0;
-  assert_int_equal(orb_relief_create(ctx, &body[0], grain, 0, &relief[0]), ORB_OK);
-  assert_int_equal(orb_relief_create(ctx, &body[1], grain, 0, &relief[1]), ORB_OK);
+  assert_int_equal(orb_relief_create(ctx, &body[0], grain, &relief[0]), ORB_OK);
+  assert_int_equal(orb_relief_create(ctx, &body[1], grain, &relief[1]), ORB_OK);
   for (int32_t v = 0; v < coarse.vertex_count; v++) { /* the ball's first vertices are those of the coarser one */
     assert_true(orb_distance2(coarse.positions + 3 * (size_t)v, fine.positions + 3 * (size_t)v) < 1e-20);
     const size_t at = ORB_RELIEF_SIZES * (size_t)v + 1;
@@ -125,6 +126,36 @@ static void relief_does_not_depend_on_triangles(void **state) {
   }
   shape_free(ctx, &coarse);
   shape_free(ctx, &fine);
+}
+
+/* A shape and its own relief share all. With each vertex placed at another one, they share nothing: the squared
+ * difference of two unrelated heights of variance 1 is 2, but what counts is bounded by 1. */
+static void noise_is_what_reliefs_do_not_share(void **state) {
+  (void)state;
+  orb_mesh mesh = bumpy(4, 1);
+  orb_body body;
+  orb_relief relief = relief_of(&mesh, &body);
+  int32_t *place = orb_alloc(ctx, (size_t)mesh.vertex_count, sizeof *place);
+  assert_non_null(place);
+  for (int32_t v = 0; v < mesh.vertex_count; v++) {
+    place[v] = v;
+  }
+  assert_true(orb_relief_noise(&body, &relief, &relief, place) == 0);
+  double last = 0;
+  for (int k = 1; k < 4; k++) { /* rotated a little, and more */
+    for (int32_t v = 0; v < mesh.vertex_count; v++) {
+      const double *p = mesh.positions + 3 * (size_t)v, c = cos(0.1 * k), s = sin(0.1 * k);
+      const double d[3] = {c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]};
+      place[v] = nearest_vertex(&mesh, d);
+    }
+    const double noise = orb_relief_noise(&body, &relief, &relief, place);
+    assert_true(noise > last && noise <= 1);
+    last = noise;
+  }
+  orb_free(ctx, place);
+  orb_relief_free(ctx, &relief);
+  orb_body_free(ctx, &body);
+  shape_free(ctx, &mesh);
 }
 
 /* Steps from beside the bump, for the heights of its top, lead to the top. */
@@ -141,7 +172,7 @@ static void steps_lead_to_the_same_height(void **state) {
   for (int i = 0; i < 20; i++) {
     const int32_t u = nearest_vertex(&mesh, p);
     orb_sub(p, mesh.positions + 3 * (size_t)u, from);
-    orb_relief_step(relief.height + ORB_RELIEF_SIZES * (size_t)top, &relief, u, from, body.normal + 3 * (size_t)u,
+    orb_relief_step(relief.height + ORB_RELIEF_SIZES * (size_t)top, &relief, u, from, body.normal + 3 * (size_t)u, 0.1,
                     step);
     assert_true(orb_length(step) < 0.05 && fabs(orb_dot(step, body.normal + 3 * (size_t)u)) < 1e-12);
     for (int k = 0; k < 3; k++) {
@@ -182,6 +213,14 @@ static double slid(double angle) {
   return off / count;
 }
 
+/* Ten rounds leave half of a rotation that is twice as wide as the bumps, or all of it. A slide that still moves goes
+ * on. */
+static void a_slide_goes_on_while_it_moves(void **state) {
+  (void)state;
+  assert_true(slid(0.3) < 0.03);
+  assert_true(slid(0.4) < 0.03);
+}
+
 /* A map of least energy may rotate a ball freely. The normals of its low bumps hardly hold it: without the relief,
  * nearly the whole rotation would be left. */
 static void low_bumps_hold_a_slide(void **state) {
@@ -190,9 +229,12 @@ static void low_bumps_hold_a_slide(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(a_ball_has_no_relief), cmocka_unit_test(relief_rises_to_a_bump),
+  const struct CMUnitTest tests[] = {cmocka_unit_test(a_ball_has_no_relief),
+                                     cmocka_unit_test(relief_rises_to_a_bump),
                                      cmocka_unit_test(relief_does_not_depend_on_triangles),
                                      cmocka_unit_test(steps_lead_to_the_same_height),
-                                     cmocka_unit_test(low_bumps_hold_a_slide)};
+                                     cmocka_unit_test(low_bumps_hold_a_slide),
+                                     cmocka_unit_test(a_slide_goes_on_while_it_moves),
+                                     cmocka_unit_test(noise_is_what_reliefs_do_not_share)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

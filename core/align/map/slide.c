@@ -11,6 +11,7 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "elastic/elastic.h"
+#include "numeric/vec3.h"
 
 /* Sets the targets to where the moving shape comes to lie when it slides from the map of a level of all vertices. */
 static orb_status slide_targets(orb_map_run *c, const orb_map_level *l, const int32_t *to_mesh) {
@@ -48,14 +49,36 @@ done:
   return status;
 }
 
-/* Draws a level of all vertices to the targets. */
-static orb_status draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
+/* The share of the vertices of a level of all vertices that are far from their targets. */
+static double share_left(const orb_map_run *c, const orb_map_level *l, const int32_t *to_mesh) {
+  const double far = c->params.slide.far;
+  int32_t left = 0;
+  for (int32_t v = 0; v < l->count; v++) {
+    left += orb_distance2(l->y + 3 * (size_t)v, c->target + 3 * (size_t)to_mesh[l->vertex[v]]) > far * far;
+  }
+  return (double)left / l->count;
+}
+
+/* Draws a level of all vertices to the targets once. */
+static orb_status draw_once(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
   const orb_map_params *p = &c->params;
   const int64_t least = p->targets.work * (int64_t)c->vertex_count;
   c->work = c->work > least ? c->work : least;
   orb_map_set_pull(c, l, to_mesh, p->slide.pull);
   ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(p), p->slide.sweeps));
   return orb_map_loosen(c, l, p->clear.first_barrier, p->slide.loosen, p->slide.sweeps);
+}
+
+/* Draws a level of all vertices to the targets, again as long as that brings many of those left to theirs: a limb that
+ * has slid far is still on its way after a draw. */
+static orb_status draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
+  double before, left = 1;
+  do {
+    before = left;
+    ORB_TRY(draw_once(c, l, to_mesh));
+    left = share_left(c, l, to_mesh);
+  } while (left > c->params.slide.left && left < c->params.slide.arrived * before);
+  return ORB_OK;
 }
 
 orb_status orb_map_slide(orb_map_run *c, double below) {

@@ -210,12 +210,16 @@ typedef struct orb_map_params {
   /* Sliding the last map to where the shapes fit in space. Chosen on six pairs of posed people and six of animals of
      the half `choose` of tests/bench/correspond.py. */
   struct {
-    double pull; /* strength, relative to the energy of a vertex's area. Ten times as much follows closer, and costs
-                    energy */
-    int sweeps;  /* without flips, before and after */
-    int loosen;  /* with flips allowed */
-    double most; /* energy afterwards, relative to before. With 1.03, maps of animals of two kinds stayed: their
-                    relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
+    double pull;    /* strength, relative to the energy of a vertex's area. Ten times as much follows closer, and costs
+                       energy */
+    int sweeps;     /* without flips, before and after */
+    int loosen;     /* with flips allowed */
+    double far;     /* from its target, in radii of a ball of the shape's area: beyond this a vertex is left behind. A
+                       vertex that has arrived is within 0.03 */
+    double left;    /* share of the vertices that may stay behind: where a leg had slid far, ten times as many did */
+    double arrived; /* of those left, another draw leaves at most this share, or it is the last */
+    double most;    /* energy afterwards, relative to before. With 1.03, maps of animals of two kinds stayed: their
+                       relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
   } slide;
 
   /* Drawing a level without flips to its spatial targets. */
