@@ -8,17 +8,16 @@
 #include "metrics.h"
 #include "store/spheres.h"
 
-/* Blocks: reads the object's table. */
-static void reply_sphere(request *r) {
+/* Sends a shape's sphere, or the places that are in the same object. Blocks: reads the object's table. */
+static void reply_part_of_spheres(request *r, int shape, const char *name) {
   object_part part;
-  char name[32], disposition[DISPOSITION_SIZE];
+  char disposition[DISPOSITION_SIZE];
   object_is_ready(r, OBJECT_SPHERES, "");
-  store_result found = spheres_find(r->srv->store, r->id, r->shape, &part.start, &part.length);
+  store_result found = spheres_find(r->srv->store, r->id, shape, &part.start, &part.length);
   if (found != STORE_OK) {
     reply_store(r, found);
     return;
   }
-  snprintf(name, sizeof name, "sphere-%d.ply", r->shape);
   disposition_write(name, disposition);
   reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", disposition);
 }
@@ -48,12 +47,19 @@ static int file_of(request *r, const cached *entry) {
              reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", disposition);
       break;
     case ROUTE_SUPERMESH_PLACES:
+      if (resource_places_are_joined(&entry->row)) {
+        if ((done = r->phase == PHASE_AWAY) != 0) {
+          reply_part_of_spheres(r, SPHERES_PLACES, "places.bin");
+        }
+        break;
+      }
       disposition_write("places.bin", disposition);
       done = object_is_ready(r, OBJECT_PLACES, entry->row.places) &&
              reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", disposition);
       break;
     case ROUTE_SUPERMESH_SPHERE:
-      reply_sphere(r);
+      snprintf(name, sizeof name, "sphere-%d.ply", r->shape);
+      reply_part_of_spheres(r, r->shape, name);
       break;
     default:
       return reply_asset(r, entry);

@@ -131,8 +131,8 @@ int object_is_ready(request *r, object_kind kind, const char *sha) {
 int reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha, const char *mime,
                const char *disposition) {
   char etag[40], content_range[80];
-  int fd,
-      compresses = kind == OBJECT_ASSET || kind == OBJECT_QUANTIZED || kind == OBJECT_SPHERE || kind == OBJECT_SPHERES;
+  int fd, compresses = kind == OBJECT_ASSET || kind == OBJECT_QUANTIZED || kind == OBJECT_SPHERE ||
+                       r->route->id == ROUTE_SUPERMESH_SPHERE;
   uint64_t size, first = 0, length;
   if (r->is_unverified) {
     reply_store(r, r->is_away ? STORE_AWAY : STORE_ERROR);

@@ -16,6 +16,7 @@ typedef enum task_kind { TASK_CHECK, TASK_EMBEDDING, TASK_SUPERMESH, TASK_PROFIL
 typedef struct task_head {
   task_kind kind;
   int threads, nice;
+  int bucket;            /* whether objects go to a bucket */
   int again;             /* the process waits for another check after this one; the next three limit all of them */
   int64_t limit, inputs; /* bytes that the process may take, and of all inputs together */
   int64_t cpu_seconds;

@@ -83,12 +83,17 @@ typedef struct resource {
   resource_kind kind;
   char id[API_ID_SIZE];
   char sha[API_ID_SIZE];    /* SHA-256 of its object; landmarks: their id */
-  char places[API_ID_SIZE]; /* SHA-256 of its places object; "": none, or stored before this column existed */
+  char places[API_ID_SIZE]; /* SHA-256 of its places object, or RESOURCE_PLACES_JOINED; "": none, or stored before this
+                             * column existed */
   char profiles[PROFILES_STORED][API_ID_SIZE]; /* SHA-256 of the profiles of its asset; "": not made */
   char *json;                                  /* its description */
   int64_t bytes;                               /* of its objects */
   int64_t created;
 } resource;
+
+/* The places of a supermesh are in its file of aligned spheres (store/spheres.h). */
+#define RESOURCE_PLACES_JOINED "spheres"
+int resource_places_are_joined(const resource *row);
 void resource_free(resource *r);
 
 /* The kind of the row that names an object. */

@@ -148,6 +148,8 @@ static const char *const migrations[] = {
     " UPDATE owner SET derived=NEW.bytes WHERE kind=NEW.kind AND id=NEW.id; END;",
     /* The span that a job belongs to. */
     "ALTER TABLE job ADD COLUMN trace TEXT NOT NULL DEFAULT '';",
+    /* Places may be in the file of spheres (RESOURCE_PLACES_JOINED), which earlier programs do not know. */
+    "SELECT 1;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -314,6 +314,10 @@ int objects_are_remote(const objects *store) {
   return store->vault != NULL;
 }
 
+int objects_go_to_bucket(const objects *store) {
+  return store->vault != NULL || store->remote.bucket;
+}
+
 int objects_are_away(const objects *store) {
   return store->vault && vault_is_away(store->vault);
 }

@@ -79,6 +79,7 @@ store_result objects_look(const objects *store, object_kind kind, const char *id
 int objects_is_near(const objects *store, object_kind kind, const char *id);
 /* Whether the objects are in a bucket, and whether the bucket fails to answer. */
 int objects_are_remote(const objects *store);
+int objects_go_to_bucket(const objects *store); /* as the first, also for the store of a process without files */
 int objects_are_away(const objects *store);
 /* Whether it has failed to answer at some time since `since` (orb_clock_ms()). */
 int objects_were_away(const objects *store, int64_t since);

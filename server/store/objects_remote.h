@@ -13,6 +13,7 @@ typedef struct objects_remote {
   store_result (*publish)(void *user, object_kind kind, const char *id, int fd);
   store_result (*read)(void *user, object_kind kind, const char *id, int *fd, uint64_t *size);
   void *user;
+  int bucket; /* whether what is published goes to a bucket */
 } objects_remote;
 
 #endif

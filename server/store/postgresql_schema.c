@@ -288,5 +288,7 @@ const char *const postgresql_migrations[] = {
     " BEGIN shapes:=$1::json->'shapes'; EXCEPTION WHEN OTHERS THEN RETURN; END;"
     " IF json_typeof(shapes)='array' THEN RETURN QUERY SELECT DISTINCT k || ':' || (s->>k)"
     "  FROM json_array_elements(shapes) s, (VALUES('mesh'), ('name')) v(k) WHERE s->>k IS NOT NULL; END IF; END $$;",
+    /* Places may be in the file of spheres (RESOURCE_PLACES_JOINED), which earlier programs do not know. */
+    "DO $$ BEGIN END $$;",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];

@@ -21,6 +21,10 @@ resource_kind resource_of_object(object_kind kind) {
                                     : RESOURCE_SUPERMESH;
 }
 
+int resource_places_are_joined(const resource *row) {
+  return strcmp(row->places, RESOURCE_PLACES_JOINED) == 0;
+}
+
 int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]) {
   static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
                                                     OBJECT_ALIGNMENT};
@@ -31,7 +35,7 @@ int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]) {
   }
   /* Supermeshes of older engines have no aligned spheres; their descriptions do not name any. */
   int spheres = row->kind == RESOURCE_SUPERMESH && strstr(row->json, "\"sphere\":") != NULL;
-  if (row->kind == RESOURCE_SUPERMESH && (row->places[0] || spheres)) {
+  if (row->kind == RESOURCE_SUPERMESH && (row->places[0] || spheres) && !resource_places_are_joined(row)) {
     out[count++] = (named_object){OBJECT_PLACES, "its places file", row->places};
   }
   if (spheres) {

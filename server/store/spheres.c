@@ -8,7 +8,7 @@
 #include "orbmorph/format.h"
 
 enum { HASH_BYTES = 32, TAIL_BYTES = HASH_BYTES + 4 + 8, SHAPES_MOST = 16 };
-static const char mark[] = "ORBSPHER";
+static const char mark[] = "ORBSPHER", mark_joined[] = "ORBSPHPL";
 
 static void put(unsigned char *at, uint64_t value, int bytes) {
   for (int i = 0; i < bytes; i++) {
@@ -44,26 +44,27 @@ static store_result pour_sphere(sink *to, orb_context *ctx, const orb_aligned_sh
   return result;
 }
 
-static store_result pour_tail(sink *to, const uint64_t *starts, int32_t shapes) {
-  unsigned char table[8 * (SHAPES_MOST + 1)], tail[TAIL_BYTES];
-  for (int32_t s = 0; s <= shapes; s++) {
+static store_result pour_tail(sink *to, const uint64_t *starts, int32_t shapes, int joined) {
+  unsigned char table[8 * (SHAPES_MOST + 2)], tail[TAIL_BYTES];
+  const int32_t parts = shapes + joined;
+  for (int32_t s = 0; s <= parts; s++) {
     put(table + 8 * s, starts[s], 8);
   }
-  store_result result = pour(to, table, 8 * (size_t)(shapes + 1));
+  store_result result = pour(to, table, 8 * (size_t)(parts + 1));
   if (result != STORE_OK) {
     return result;
   }
   crypto_hash_sha256_final(&to->hash, tail);
   put(tail + HASH_BYTES, (uint64_t)shapes, 4);
-  memcpy(tail + HASH_BYTES + 4, mark, 8);
+  memcpy(tail + HASH_BYTES + 4, joined ? mark_joined : mark, 8);
   to->size += sizeof tail;
   return objects_append(&to->temp, tail, sizeof tail);
 }
 
 store_result spheres_put(objects *store, orb_context *ctx, const char *id, const orb_alignment *alignment,
-                         int64_t *bytes, orb_status *status) {
+                         const orb_buffer *places, int64_t *bytes, orb_status *status) {
   sink to = {.size = 0};
-  uint64_t starts[SHAPES_MOST + 1] = {0};
+  uint64_t starts[SHAPES_MOST + 2] = {0};
   *status = ORB_OK;
   if (alignment->shape_count > SHAPES_MOST) {
     return STORE_ERROR;
@@ -77,11 +78,21 @@ store_result spheres_put(objects *store, orb_context *ctx, const char *id, const
     result = pour_sphere(&to, ctx, &alignment->shapes[s], status);
     starts[s + 1] = to.size;
   }
-  result = result == STORE_OK ? pour_tail(&to, starts, alignment->shape_count) : result;
+  if (places && result == STORE_OK) {
+    result = pour(&to, places->data, places->size);
+    starts[alignment->shape_count + 1] = to.size;
+  }
+  result = result == STORE_OK ? pour_tail(&to, starts, alignment->shape_count, places != NULL) : result;
   result = result == STORE_OK ? objects_publish(store, &to.temp, OBJECT_SPHERES, id) : result;
   objects_abandon(&to.temp);
   *bytes = (int64_t)to.size;
   return result;
+}
+
+/* Whether a file ends in a mark. *joined: it has the places. */
+static int is_marked(const unsigned char tail[TAIL_BYTES], int *joined) {
+  *joined = memcmp(tail + HASH_BYTES + 4, mark_joined, 8) == 0;
+  return *joined || memcmp(tail + HASH_BYTES + 4, mark, 8) == 0;
 }
 
 static int read_at(int fd, void *out, size_t size, uint64_t at) {
@@ -90,7 +101,7 @@ static int read_at(int fd, void *out, size_t size, uint64_t at) {
 }
 
 store_result spheres_find(const objects *store, const char *id, int shape, uint64_t *start, uint64_t *length) {
-  int fd;
+  int fd, joined;
   uint64_t size;
   unsigned char tail[TAIL_BYTES], entry[16];
   store_result result = objects_read(store, OBJECT_SPHERES, id, &fd, &size);
@@ -98,12 +109,13 @@ store_result spheres_find(const objects *store, const char *id, int shape, uint6
     return result;
   }
   result = STORE_ERROR;
-  if (size > TAIL_BYTES && read_at(fd, tail, sizeof tail, size - TAIL_BYTES) &&
-      memcmp(tail + HASH_BYTES + 4, mark, 8) == 0) {
-    uint64_t shapes = get(tail + HASH_BYTES, 4), table = size - TAIL_BYTES - 8 * (shapes + 1);
-    if (shape < 0 || (uint64_t)shape >= shapes) {
+  if (size > TAIL_BYTES && read_at(fd, tail, sizeof tail, size - TAIL_BYTES) && is_marked(tail, &joined)) {
+    const uint64_t shapes = get(tail + HASH_BYTES, 4), parts = shapes + (uint64_t)joined;
+    const uint64_t table = size - TAIL_BYTES - 8 * (parts + 1);
+    const uint64_t part = shape == SPHERES_PLACES ? shapes : (uint64_t)shape;
+    if (shape == SPHERES_PLACES ? !joined : shape < 0 || part >= shapes) {
       result = STORE_NOT_FOUND;
-    } else if (shapes <= SHAPES_MOST && table < size && read_at(fd, entry, 16, table + 8 * (uint64_t)shape)) {
+    } else if (shapes <= SHAPES_MOST && table < size && read_at(fd, entry, 16, table + 8 * part)) {
       uint64_t end = get(entry + 8, 8);
       *start = get(entry, 8);
       *length = end - *start;
@@ -133,13 +145,14 @@ static int hash_first(int fd, uint64_t size, unsigned char hash[HASH_BYTES]) {
 
 store_result spheres_check_file(int fd, uint64_t size) {
   unsigned char tail[TAIL_BYTES], hash[HASH_BYTES];
+  int joined;
   if (size <= TAIL_BYTES) {
     return STORE_CONFLICT;
   }
   if (!read_at(fd, tail, sizeof tail, size - TAIL_BYTES) || !hash_first(fd, size - TAIL_BYTES, hash)) {
     return STORE_ERROR;
   }
-  return memcmp(tail + HASH_BYTES + 4, mark, 8) == 0 && memcmp(tail, hash, HASH_BYTES) == 0 ? STORE_OK : STORE_CONFLICT;
+  return is_marked(tail, &joined) && memcmp(tail, hash, HASH_BYTES) == 0 ? STORE_OK : STORE_CONFLICT;
 }
 
 store_result spheres_check(const objects *store, const char *id) {

@@ -6,6 +6,10 @@
  *   uint64[shapes + 1]  where each begins, and where the last ends
  *   uint8[32]           SHA-256 of all bytes so far
  *   uint32 shapes, char[8] "ORBSPHER"
+ *
+ * In a bucket, where each object costs a request, the file has the places as well: they follow the last PLY, the table
+ * has one more entry, and the file ends in "ORBSPHPL". The row says so: RESOURCE_PLACES_JOINED. A bucket may have
+ * supermeshes of both forms.
  */
 #ifndef ORB_STORE_SPHERES_H
 #define ORB_STORE_SPHERES_H
@@ -13,12 +17,15 @@
 #include "orbmorph/alignment.h"
 #include "store/objects.h"
 
-/* Writes and publishes the object; *bytes: its size. Holds one sphere in memory at a time. If *status is not ORB_OK,
- * the context holds the error and the result is STORE_ERROR. */
+/* Writes and publishes the object; *bytes: its size. places: the bytes of the places; NULL: they are an object. Holds
+ * one sphere in memory at a time. If *status is not ORB_OK, the context holds the error and the result is STORE_ERROR.
+ */
 store_result spheres_put(objects *store, orb_context *ctx, const char *id, const orb_alignment *alignment,
-                         int64_t *bytes, orb_status *status);
+                         const orb_buffer *places, int64_t *bytes, orb_status *status);
 
-/* The byte range of a shape's sphere in the object. STORE_NOT_FOUND: no object, or no such shape. Blocks. */
+/* The byte range of a shape's sphere in the object, or of the places (SPHERES_PLACES). STORE_NOT_FOUND: no object, or
+ * no such part. Blocks. */
+enum { SPHERES_PLACES = -1 };
 store_result spheres_find(const objects *store, const char *id, int shape, uint64_t *start, uint64_t *length);
 
 /* Verifies the object's hash. STORE_NOT_FOUND: no object. */

@@ -92,7 +92,7 @@ static orb_context *make_context(confined *c, job_progress *progress) {
 }
 
 static _Noreturn void run_job_task(confined *c) {
-  const objects_remote remote = {publish, read_object, c};
+  const objects_remote remote = {publish, read_object, c, c->task.bucket};
   job_progress progress = {.show = show, .user = c};
   run_env env = {.progress = &progress, .get = get, .user = c};
   const run_job task = {c->task.key, c->request, c->task.embed_ms};
@@ -139,7 +139,7 @@ static void check_one(confined *c, const frame *f) {
 }
 
 _Noreturn static void run_conversion(confined *c, const frame *f) {
-  const objects_remote remote = {publish, read_object, c};
+  const objects_remote remote = {publish, read_object, c, c->task.bucket};
   objects *store;
   api_problem problem = {0};
   done_head done = {0};

@@ -291,6 +291,7 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
   task_head task = {.kind = kind == API_JOB_EMBEDDING ? TASK_EMBEDDING : TASK_SUPERMESH,
                     .threads = limits->threads,
                     .nice = limits->nice,
+                    .bucket = objects_are_remote(env->store),
                     .limit = limits->memory,
                     .memory = limits->memory,
                     .inputs = inputs.bytes,

@@ -157,34 +157,40 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, api
   return 1;
 }
 
-/* Like the asset, stored before the row: a supermesh with a row has all its objects. */
-static int store_places(const run_env *env, orb_context *ctx, const merge_input *in, const orb_merge_result *merged,
-                        resource *result, api_problem *problem) {
-  orb_buffer places = {0};
-  int fine = places_write(ctx, in->meshes, in->corners, merged, &places) == ORB_OK;
-  if (fine) {
-    api_id_of_text((const char *)places.data, places.size, result->places);
-    store_result stored = objects_put(env->store, OBJECT_PLACES, result->id, places.data, places.size);
-    result->bytes += (int64_t)places.size;
-    fine = stored == STORE_OK;
-    if (!fine) {
-      task_refuse_store(stored, problem);
-    }
-  }
-  orb_buffer_free(ctx, &places);
-  return fine;
+static int store_places(const run_env *env, const orb_buffer *places, resource *result, api_problem *problem) {
+  api_id_of_text((const char *)places->data, places->size, result->places);
+  store_result stored = objects_put(env->store, OBJECT_PLACES, result->id, places->data, places->size);
+  result->bytes += (int64_t)places->size;
+  return stored == STORE_OK || task_refuse_store(stored, problem);
 }
 
-static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_result *merged, resource *result,
-                         api_problem *problem) {
+/* places: that are stored in the same object; NULL: they are one. */
+static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_result *merged, const orb_buffer *places,
+                         resource *result, api_problem *problem) {
   int64_t bytes = 0;
   orb_status status;
-  store_result stored = spheres_put(env->store, ctx, result->id, &merged->alignment, &bytes, &status);
+  store_result stored = spheres_put(env->store, ctx, result->id, &merged->alignment, places, &bytes, &status);
   result->bytes += bytes;
   if (stored != STORE_OK && status == ORB_OK) {
     task_refuse_store(stored, problem);
   }
   return stored == STORE_OK;
+}
+
+/* Like the asset, stored before the row: a supermesh with a row has all its objects. A bucket gets places and spheres
+ * as one object, since each object costs a request. */
+static int store_places_and_spheres(const run_env *env, orb_context *ctx, const merge_input *in,
+                                    const orb_merge_result *merged, resource *result, api_problem *problem) {
+  const int joins = objects_go_to_bucket(env->store);
+  orb_buffer places = {0};
+  int fine = places_write(ctx, in->meshes, in->corners, merged, &places) == ORB_OK;
+  if (fine && joins) {
+    strcpy(result->places, RESOURCE_PLACES_JOINED);
+  }
+  fine = fine && (joins || store_places(env, &places, result, problem)) &&
+         store_spheres(env, ctx, merged, joins ? &places : NULL, result, problem);
+  orb_buffer_free(ctx, &places);
+  return fine;
 }
 
 /* A place in the form in which a request names it: by a triangle of the file, or as a point if a repair added the
@@ -245,7 +251,7 @@ static int store_result_of(const run_env *env, orb_context *ctx, const run_job *
     task_refuse_store(stored, problem);
     return 0;
   }
-  if (!store_places(env, ctx, in, merged, result, problem) || !store_spheres(env, ctx, merged, result, problem)) {
+  if (!store_places_and_spheres(env, ctx, in, merged, result, problem)) {
     return 0;
   }
   api_place *found = found_spots(ctx, in, merged), *others = other_spots(ctx, in, &merged->alignment);

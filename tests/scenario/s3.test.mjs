@@ -12,7 +12,7 @@ import { runProgram } from './support/cli.mjs';
 import { assertProblem, Daemon, daemon, root, samples, until } from './support/daemon.mjs';
 import { workers } from './support/processes.mjs';
 import { busy, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
-import { tetrahedron } from './support/shapes.mjs';
+import { bean, egg, obj, tetrahedron } from './support/shapes.mjs';
 
 const server = process.env.ORB_S3;
 const program = process.env.ORB_DAEMON; // starts a daemon with objects in files
@@ -123,6 +123,63 @@ test('what was stored is served after the cache was emptied, whole and in ranges
   });
   assert.equal(check.status, 0, check.stdout + check.stderr);
   assert.match(check.stdout, /1 rows and 1 objects checked: 0 wrong, 0 objects without a row/);
+});
+
+test('places and spheres of a supermesh are one object, and those that are two are served as well', async (t) => {
+  const { d, empty } = await stored(t, 'joined');
+  const shapes = [];
+  for (const shape of [egg(2), bean(2)]) shapes.push({ mesh: (await d.upload(obj(shape))).json.id });
+  const request = { shapes, align: { method: 'rotate' } };
+  const { id } = await d.made('/v1/supermeshes', request);
+  const url = `/v1/supermeshes/${id}`;
+  const served = async () => {
+    const files = {};
+    for (const part of ['asset.glb', 'places', 'spheres/0.ply', 'spheres/1.ply']) {
+      const reply = await d.get(`${url}/${part}`);
+      assert.equal(reply.status, 200, `${part}: ${reply.bytes}`);
+      files[part] = [reply.bytes, reply.headers.get('etag'), reply.headers.get('content-disposition')];
+    }
+    return files;
+  };
+  const joined = await served();
+  assert.equal((await list(server, 'objects', 'joined/places/')).length, 0);
+  assert.equal((await list(server, 'objects', 'joined/spheres/')).length, 1);
+  const places = joined.places[0];
+  const part = await d.get(`${url}/places`, { headers: { range: 'bytes=4-19', 'accept-encoding': 'zstd' } });
+  assert.equal(part.status, 206);
+  assert.ok(part.bytes.equals(places.subarray(4, 20)));
+  assert.equal(part.headers.get('content-range'), `bytes 4-19/${places.length}`);
+  assert.equal((await d.get(`${url}/places`, { headers: { 'if-none-match': joined.places[1] } })).status, 304);
+  assertProblem(await d.get(`${url}/spheres/2.ply`), 404, 'not-found');
+  await d.stop();
+  await empty();
+
+  // A daemon with files makes the same bytes, places as an object of its own; a bucket may have such pairs.
+  const files = await daemon(t, { program: [program] });
+  for (const shape of [egg(2), bean(2)]) await files.upload(obj(shape));
+  assert.equal((await files.made('/v1/supermeshes', request)).id, id);
+  const kind = (name) => readFile(path.join(files.data, 'objects', name, id.slice(0, 2), id));
+  assert.ok((await kind('places')).equals(places));
+  assert.ok((await files.get(`${url}/places`)).bytes.equals(places));
+  const { createHash } = await import('node:crypto');
+  for (const name of ['places', 'spheres']) {
+    const bytes = await kind(name);
+    const meta = { sha256: createHash('sha256').update(bytes).digest('hex') };
+    assert.ok((await s3(server, 'PUT', `objects/joined/${name}/${id.slice(0, 2)}/${id}`, bytes, meta)).ok);
+  }
+  const sha = createHash('sha256').update(places).digest('hex');
+  execFileSync('sqlite3', [path.join(d.data, 'catalogue.sqlite'), `UPDATE resource SET places='${sha}' WHERE kind=2`]);
+  await d.start();
+  assert.deepEqual(await served(), joined);
+  await d.stop();
+  const check = spawnSync(program, ['--check-data', '--data', d.data, '--objects', at('objects/joined')], {
+    encoding: 'utf8',
+  });
+  assert.match(check.stdout, /: 0 wrong, 0 objects without a row/, check.stdout + check.stderr);
+  await d.start();
+  assert.equal((await d.delete(url)).status, 204);
+  for (const name of ['asset', 'places', 'spheres'])
+    assert.equal((await list(server, 'objects', `joined/${name}/`)).length, 0, name);
 });
 
 test('a damaged object in the bucket is found, and made again', async (t) => {
