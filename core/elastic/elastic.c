@@ -12,7 +12,8 @@
  * of where the mesh is, on the way that it took in the last round (momentum; Nesterov 1983). A place is where the
  * vertex is already, except for its distance from the surface, so a pull moves it along the surface by little in each
  * round. What else moves it along the surface is the relief (relief.h): normals of a limb hardly tell how far along the
- * limb and around it a vertex belongs, but its muscles do. */
+ * limb and around it a vertex belongs, but its muscles do. A limb that begins far away takes more rounds than others,
+ * so a slide goes on while it moves. */
 #include "elastic/elastic.h"
 
 #include <math.h>
@@ -35,7 +36,7 @@ enum {
   MAP_ROUNDS = 2,         /* along the rough map alone; 8 change little */
   PLACE_ROUNDS = 6,       /* to the nearest places; 10 rank maps no better, and let wrong ones catch up */
   SLIDE_ROUNDS = 10,      /* in which the reach shrinks. More bring others no nearer to the truth, */
-  SLIDE_ROUNDS_MOST = 40, /* but one that still moves goes on: a limb that began far away takes 30 */
+  SLIDE_ROUNDS_MOST = 40, /* but one that still moves goes on: a leg that began a tenth of the body away took 31 */
   ALTERNATIONS = 2,       /* of rotations and positions in a round */
   SURROUNDINGS = 4, /* a vertex takes its first rotation from the images of its surroundings, one vertex in this many of
                        the mesh. With one in 16, a limb's girth and as much of its length, noise of the rough map stays
