@@ -109,10 +109,14 @@ int access_check(request *r, const char *path, api_problem *problem) {
   return 0;
 }
 
-int access_is_operator(const request *r) {
+int access_is_operator(request *r) {
   caller *who = r->srv->needs_token ? find_caller(r->srv, header_of(r, "Authorization")) : NULL;
   int admin = who && !caller_expired(who) && (__atomic_load_n(&who->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
-  caller_release(who);
+  if (admin && !r->caller) {
+    r->caller = who; /* for the audit log */
+  } else {
+    caller_release(who);
+  }
   return !r->srv->needs_token || admin;
 }
 
@@ -153,14 +157,20 @@ int access_priority(const request *r) {
   return QUEUE_URGENCIES * class + QUEUE_URGENCIES - 1 - parse_urgency(header_of(r, "Priority"));
 }
 
+/* A read of what others own, or of the service, if the caller has the scope admin. */
+static int may_read_all(const request *r) {
+  return r->route->scope == SCOPE_READ || r->route->scope == SCOPE_ADMIN ||
+         (r->route->id == ROUTE_READYZ && query_has(r, "verbose"));
+}
+
 /* The audit log names refused callers, deletions, and reads with the scope admin. It names no other request. */
 static const char *audited(const request *r) {
   int admin = r->caller && (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
-  return r->status == 401 || r->status == 403                                         ? "refused"
-         : r->status >= 400 || !r->route                                              ? NULL
-         : strcmp(r->route->method, "DELETE") == 0                                    ? "delete"
-         : admin && (r->route->scope == SCOPE_READ || r->route->scope == SCOPE_ADMIN) ? "admin-read"
-                                                                                      : NULL;
+  return r->status == 401 || r->status == 403      ? "refused"
+         : r->status >= 400 || !r->route           ? NULL
+         : strcmp(r->route->method, "DELETE") == 0 ? "delete"
+         : admin && may_read_all(r)                ? "admin-read"
+                                                   : NULL;
 }
 
 void access_audit(const request *r, const struct sockaddr *address) {

@@ -203,7 +203,7 @@ int access_check(request *r, const char *path, api_problem *problem);
  * u=0 to 7). */
 int access_priority(const request *r);
 /* 1 with the scope admin, or where no token is needed: the caller may see the numbers of the whole service. */
-int access_is_operator(const request *r);
+int access_is_operator(request *r);
 /* Writes a line for the audit log if the caller was refused, or if the request deleted something or read with the scope
  * admin. After the answer; address: NULL, or the client's. */
 void access_audit(const request *r, const struct sockaddr *address);

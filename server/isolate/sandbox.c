@@ -22,6 +22,7 @@ enum {
   THREAD_BYTES = 10 << 20, /* the stack of a thread, and what malloc() keeps for it */
   ARENAS = 4,              /* of malloc(), each of which reserves ARENA_BYTES */
   ARENA_BYTES = 64 << 20,
+  DATA_SLACK = 64 << 20, /* of memory that can be written, where address space that is only reserved does not count */
   DESCRIPTORS = 128
 };
 
@@ -118,6 +119,9 @@ int sandbox_enter(const sandbox_limits *limits) {
     (void)mallopt(M_ARENA_MAX, ARENAS);
     limit(RLIMIT_AS,
           (uint64_t)limits->memory + SLACK + (uint64_t)limits->threads * THREAD_BYTES + (uint64_t)ARENAS * ARENA_BYTES);
+    /* Twice the budget: libraries allocate by themselves what a block of the budget stands for. Far less than the
+     * address space where the budget is small, and most processes have a small one. */
+    limit(RLIMIT_DATA, 2 * (uint64_t)limits->memory + DATA_SLACK + (uint64_t)limits->threads * THREAD_BYTES);
   }
   if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) {
     return 0;

@@ -188,6 +188,7 @@ test('a token is valid until it expires, and the audit log names who was refused
   const gone = await d.delete(`/v1/meshes/${id}`, bearer(root));
   assert.equal(gone.status, 204);
   assert.equal((await d.get('/metrics', bearer(root))).status, 200);
+  assert.ok((await d.get('/readyz?verbose', bearer(root))).json.integrity);
   await d.stop();
   const lines = d.log
     .split('\n')
@@ -213,6 +214,7 @@ test('a token is valid until it expires, and the audit log names who was refused
   has({ audit: 'refused', token: 'day', address, status: 403, route: '/metrics' });
   has({ audit: 'delete', token: 'root', tenant: 'root', id, address, request: gone.headers.get('x-request-id') });
   has({ audit: 'admin-read', token: 'root', route: '/metrics', address });
+  has({ audit: 'admin-read', token: 'root', route: '/readyz', address });
   assert.ok(!lines.some(({ token, audit }) => token === 'soon' && audit !== 'refused'), 'ordinary reads are not in it');
   for (const secret of [soon, day, past, root]) assert.ok(!d.log.includes(secret));
 });

@@ -15,6 +15,7 @@
 #include <sodium.h>
 
 #include "api/json.h"
+#include "isolate/sandbox.h"
 #include "isolate/task.h"
 #include "log.h"
 #include "store/owners.h"
@@ -29,7 +30,8 @@ enum {
   FEW_BYTES = 'f',
   LONG_REFUSAL = '1',
   MANY_VALUES = '2',
-  LARGE_ALIGNMENT = '3'
+  LARGE_ALIGNMENT = '3',
+  GREEDY = '4'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -119,6 +121,19 @@ _Noreturn static void send_large_alignment(int channel, const char *text) {
   _exit(0);
 }
 
+/* Takes all memory that it gets, and says how many megabytes. */
+_Noreturn static void take_all(int channel, const task_head *task) {
+  done_head done = {.problem = "corrupt"};
+  int megabytes = 0;
+  task_confine(task);
+  for (char *at; megabytes < 4096 && (at = malloc(1 << 20)); megabytes++) {
+    memset(at, 1, 1 << 20);
+  }
+  snprintf(done.detail, sizeof done.detail, "%d", megabytes);
+  const struct iovec part = {&done, sizeof done};
+  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
+}
+
 /* A result that says that it has no bytes, so that no quota counts it. */
 _Noreturn static void claim_no_bytes(int channel, const task_head *task) {
   done_head done = {.fine = 1};
@@ -154,6 +169,8 @@ static void evil(int channel) {
       refuse_at_length(channel, 2 * VALUES);
     case LARGE_ALIGNMENT:
       send_large_alignment(channel, request);
+    case GREEDY:
+      take_all(channel, &task);
     default:
       break;
   }
@@ -271,6 +288,21 @@ static void test_a_result_that_says_it_has_no_bytes(void **state) {
   assert_true(end.died);
 }
 
+/* The kernel gives a process twice its budget (64 MB here), and what a small one needs beside it. */
+static void test_a_process_that_takes_all_memory(void **state) {
+  api_problem problem = {0};
+  isolated_end end;
+  if (SANDBOX_SANITIZED) {
+    skip(); /* no limit on memory */
+  }
+  assert_false(run(*state, GREEDY, &problem, &end));
+  assert_string_equal(problem.name, "corrupt");
+  const int megabytes = atoi(problem.detail);
+  print_message("%d MB\n", megabytes);
+  assert_in_range(megabytes, 64, 2 * 64 + 80);
+  api_problem_free(&problem);
+}
+
 int main(int count, char **arguments) {
   if (count > 1 && strcmp(arguments[1], ISOLATE_FLAG) == 0) {
     isolate_zygote(evil);
@@ -280,6 +312,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test_setup_teardown(test_an_object_and_then_a_damaged_input, setup, teardown),
       cmocka_unit_test_setup_teardown(test_an_object_and_then_no_end, setup, teardown),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_process_that_takes_all_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
