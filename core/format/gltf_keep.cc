@@ -265,11 +265,25 @@ struct Keeper {
     return out;
   }
 
+  /* A program that reads the asset would fail at targets that do not fit, though they come from the upload. */
+  void check_targets(const cJSON *primitive, size_t mesh, size_t count) const {
+    const List accessors = array_of(doc, "accessors");
+    for (const cJSON *target : array_of(primitive, "targets")) {
+      for (const cJSON *item = target->child; item; item = item->next) {
+        int64_t index = cJSON_IsNumber(item) ? index_of(target, item->string) : NONE;
+        if (static_cast<size_t>(whole(element(accessors, index, "accessor"), "count", 0)) != count) {
+          malformed("A morph target of " + title(mesh) + " has another number of vertices than its primitive.");
+        }
+      }
+    }
+  }
+
   void add_targets(const cJSON *primitive, size_t mesh, int64_t from, const Frame &frame, Editor *editor) {
     size_t count = count_of(primitive), width = 0;
     if (count == 0) {
       malformed("A primitive of a mesh with targets has no POSITION.");
     }
+    check_targets(primitive, mesh, count);
     bool moves_it = is_surface(primitive) && is_on(from, count);
     Numbers normal{Charged<double>(ctx)}, tangent{Charged<double>(ctx)};
     if (moves_it && shapes.normals) {

@@ -54,11 +54,18 @@ struct Weights {
     return widened.count(mesh) ? mesh : NONE;
   }
 
+  /* How many values a sampler has for each target: one a keyframe, or three. */
+  size_t keys_of(const cJSON *sampler) const {
+    const cJSON *input = element(array_of(doc, "accessors"), whole(sampler, "input", NONE), "accessor");
+    size_t keys = static_cast<size_t>(whole(input, "count", 0));
+    return text_of(sampler, "interpolation") == "CUBICSPLINE" ? 3 * keys : keys;
+  }
+
   /* The keyframes of a sampler with zeros for the new targets. */
   int64_t widen_keys(const cJSON *sampler, size_t had) const {
     size_t width = 0;
     Numbers old = buffers.accessor(whole(sampler, "output", NONE), &width);
-    if (had == 0 || width != 1 || old.size() % had != 0 || old.empty()) {
+    if (had == 0 || width != 1 || old.empty() || old.size() != had * keys_of(sampler)) {
       malformed("An animation of weights does not fit the morph targets of its mesh.");
     }
     size_t keys = old.size() / had, wide = had + more();

@@ -71,7 +71,26 @@ const char *orb_part_node(const orb_mesh *mesh, const orb_part *part) {
   return part->object < 0 ? "" : mesh->objects[part->object].node;
 }
 
-int32_t orb_parts_find(const orb_mesh *mesh, const orb_parts *parts, const orb_repair_options *options) {
+static int is_named(const orb_object *object, const char *name) {
+  return strcmp(object->name, name) == 0 || strcmp(object->node, name) == 0;
+}
+
+/* The piece of the first triangle of an object with this name; −1: there is none. */
+static int32_t piece_of_object(const orb_surface *s, const char *name) {
+  const orb_mesh *mesh = s->mesh;
+  for (int32_t t = 0, object = -1; t < mesh->triangle_count; t++) {
+    while (object + 1 < mesh->object_count && mesh->objects[object + 1].first_triangle <= mesh->source_triangle[t]) {
+      object++;
+    }
+    if (object >= 0 && mesh->source_triangle[t] >= 0 && is_named(&mesh->objects[object], name)) {
+      return s->piece[t];
+    }
+  }
+  return -1;
+}
+
+int32_t orb_parts_find(const orb_surface *s, const orb_parts *parts, const orb_repair_options *options) {
+  const orb_mesh *mesh = s->mesh;
   if (!options->part_name[0]) {
     return options->part >= 0 && options->part < parts->count ? options->part : -1;
   }
@@ -82,6 +101,12 @@ int32_t orb_parts_find(const orb_mesh *mesh, const orb_parts *parts, const orb_r
   }
   for (int32_t i = 0; i < parts->count; i++) {
     if (strcmp(orb_part_node(mesh, &parts->part[i]), options->part_name) == 0) {
+      return i;
+    }
+  }
+  int32_t piece = piece_of_object(s, options->part_name);
+  for (int32_t i = 0; i < parts->count && piece >= 0; i++) {
+    if (parts->part[i].piece == piece) {
       return i;
     }
   }

@@ -25,7 +25,9 @@ const char *orb_part_name(const orb_mesh *mesh, const orb_part *part);
 /* The name of the node that shows its mesh (glTF), or "". */
 const char *orb_part_node(const orb_mesh *mesh, const orb_part *part);
 
-/* The index of the part that the options name, −1: there is none. */
-int32_t orb_parts_find(const orb_mesh *mesh, const orb_parts *parts, const orb_repair_options *options);
+/* The index of the part that the options name, −1: there is none. By a name: the largest part with this name, else the
+ * largest one with this node, else the one that has the first triangle of an object with this name or node: it may be
+ * joined to a larger one. O(F). */
+int32_t orb_parts_find(const orb_surface *surface, const orb_parts *parts, const orb_repair_options *options);
 
 #endif

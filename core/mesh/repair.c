@@ -113,7 +113,7 @@ static orb_status keep_piece(orb_surface *s, const orb_repair_options *options) 
     status = orb_parts_list(s, &parts);
   }
   if (status == ORB_OK) {
-    int32_t kept = options->repair & ORB_REPAIR_PART ? orb_parts_find(s->mesh, &parts, options) : 0;
+    int32_t kept = options->repair & ORB_REPAIR_PART ? orb_parts_find(s, &parts, options) : 0;
     status = kept < 0 ? orb_refuse_part(s, &parts, options) : ORB_OK;
     if (status == ORB_OK && parts.count > 1) {
       for (int32_t t = 0; t < s->mesh->triangle_count; t++) {

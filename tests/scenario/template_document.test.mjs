@@ -272,6 +272,33 @@ test('a document that cannot get targets is refused by the parts at fault', asyn
     [{ where: 'animations[1]', name: 'talk' }],
     '/problems/malformed-mesh',
   );
+  const late = (gltf, push) => {
+    misfit(gltf, push);
+    gltf.accessors.at(-1).count = 2; // a value for each target, but of one of two keyframes
+  };
+  await refused(
+    shapes.egg(2),
+    late,
+    /animation of weights does not fit/,
+    [{ where: 'animations[1]', name: 'talk' }],
+    '/problems/malformed-mesh',
+  );
+  const other = (change) => (gltf, push) => {
+    misfit(gltf, push);
+    gltf.animations = undefined;
+    change(gltf, gltf.meshes[0].primitives[0].targets[0].POSITION);
+  };
+  for (const [change, detail] of [
+    [(gltf, at) => gltf.accessors[at].count--, /A morph target of mesh 0 has another number of vertices/],
+    [(gltf) => gltf.meshes[0].primitives[0].targets.splice(1, 1, { POSITION: 99 }), /missing accessor \(99\)/],
+  ])
+    await refused(
+      shapes.egg(2),
+      other(change),
+      detail,
+      [{ where: 'meshes[0]' }, { where: 'nodes[0]' }],
+      '/problems/malformed-mesh',
+    );
   const short = (gltf, push) => {
     misfit(gltf, push);
     gltf.meshes[0].name = 'face';

@@ -144,6 +144,32 @@ static void test_refusals(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
+/* An object that is joined to a larger one names their piece too. */
+static void test_part_of_piece(void **state) {
+  (void)state;
+  const char *text = TETRA_V
+      "o body\nf 1 3 2\nf 1 2 4\nf 1 4 3\no head\nf 2 3 4\no eye\n"
+      "v 9 0 0\nv 10 0 0\nv 9 1 0\nv 9 0 1\nf 5 7 6\nf 5 6 8\nf 5 8 7\nf 6 7 8\n";
+  static const struct {
+    const char *name;
+    int first;
+  } cases[] = {{"body", 0}, {"head", 0}, {"eye", 4}, {"hat", -1}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    orb_mesh mesh;
+    orb_repair_options options = {.repair = ORB_REPAIR_PART};
+    strcpy(options.part_name, cases[i].name);
+    assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, &mesh, NULL),
+                     ORB_OK);
+    orb_status status = orb_mesh_repair_with(ctx, &mesh, &options);
+    assert_int_equal(status, cases[i].first < 0 ? ORB_E_NOT_CONNECTED : ORB_OK);
+    if (status == ORB_OK) {
+      assert_int_equal(mesh.triangle_count, 4);
+      assert_int_equal(mesh.source[0], cases[i].first);
+    }
+    orb_mesh_free(ctx, &mesh);
+  }
+}
+
 /* Pieces by number and by name; the first two have names in the file. */
 static void test_parts(void **state) {
   (void)state;
@@ -379,6 +405,7 @@ int main(void) {
                                      cmocka_unit_test(test_welding_of_cubes),
                                      cmocka_unit_test(test_refusals),
                                      cmocka_unit_test(test_parts),
+                                     cmocka_unit_test(test_part_of_piece),
                                      cmocka_unit_test(test_torus),
                                      cmocka_unit_test(test_fill),
                                      cmocka_unit_test(test_fair_fill),

@@ -150,7 +150,7 @@ typedef struct orb_repair_options {
   int32_t part;       /* with ORB_REPAIR_PART: pieces are numbered by their triangles, the largest is 0 */
   char part_name[ORB_PART_NAME]; /* unless "": the largest piece with this name, instead of a number. A piece has the
                                   * name of the object that most of its triangles belong to. If no piece has the name,
-                                  * the largest one whose node has it */
+                                  * the largest one whose node has it; else the one with an object of this name */
 } orb_repair_options;
 
 /* The same with options. */
