@@ -190,13 +190,22 @@ static orb_status align_back(orb_context *ctx, const orb_align_shape shapes[2], 
   return ORB_OK;
 }
 
-/* Another map on which the rims are to be brought together. *taken: they are, and the map is not much worse; it has
- * taken the place of *out. Frees *other. searched: the map comes from a search of its own; elsewhere what the search
- * has found out stays. */
+/* How far the rims of an alignment are apart at most, relative to the diagonal; INFINITY: none are brought together. */
+static double rims_off(const orb_alignment *a) {
+  double most = a->rim_count > 0 ? 0 : INFINITY;
+  for (int32_t i = 0; i < a->rim_count; i++) {
+    most = fmax(most, a->rims[i].off_relative);
+  }
+  return most;
+}
+
+/* Another map on which the rims are to be brought together. *taken: they are, nearer than on the map that there is, and
+ * the map is not much worse; it has taken the place of *out. Frees *other. searched: the map comes from a search of its
+ * own; elsewhere what the search has found out stays. */
 static orb_status try_rims(orb_context *ctx, const orb_map_params *params, const orb_align_options *options,
                            int searched, orb_alignment *other, orb_alignment *out, int *taken) {
   const orb_status status = other->shape_count > 0 ? orb_align_rims(ctx, options, other) : ORB_OK;
-  *taken = status == ORB_OK && other->rim_count > 0 &&
+  *taken = status == ORB_OK && rims_off(other) < rims_off(out) &&
            other->energy - 1 <= params->rims.retry_times * (out->energy - 1) + params->rims.retry_more;
   if (*taken && !searched) {
     other->match = out->match;
@@ -214,7 +223,7 @@ static orb_status try_rims(orb_context *ctx, const orb_map_params *params, const
   return status;
 }
 
-/* Starts from other maps where the search leads to none that brings rims together. */
+/* Starts from other maps where the search leads to none that brings rims together all along. */
 static orb_status retry_at_rims(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
                                 orb_alignment *out) {
   const orb_map_params params = orb_map_params_of(options->preset);
@@ -226,7 +235,7 @@ static orb_status retry_at_rims(orb_context *ctx, const orb_align_shape shapes[2
     ORB_TRY(align_by_rotation(ctx, shapes, options, &other));
     ORB_TRY(try_rims(ctx, &params, options, 0, &other, out, &taken));
   }
-  if (!taken && out->energy > params.energy.poor) {
+  if (!taken && out->rim_count == 0 && out->energy > params.energy.poor) {
     ORB_TRY(align_back(ctx, shapes, options, &other));
     ORB_TRY(try_rims(ctx, &params, options, 1, &other, out, &taken));
   }
@@ -238,9 +247,10 @@ static orb_status match_rims(orb_context *ctx, const orb_align_shape *shapes, co
   ORB_TRY(orb_align_rims(ctx, options, out));
   const int both = orb_has_holes(shapes[0].mesh) && orb_has_holes(shapes[out->shape_count - 1].mesh);
   const int retries = options->method == ORB_ALIGN_AUTO && options->preset != ORB_PRESET_FAST && both &&
-                      out->shape_count == 2 && out->landmark_count == 0 && out->rim_count == 0 &&
-                      !is_large(shapes, 2, options);
-  return retries ? retry_at_rims(ctx, shapes, options, out) : ORB_OK;
+                      out->shape_count == 2 && out->landmark_count == 0 && !is_large(shapes, 2, options);
+  return retries && rims_off(out) > orb_map_params_of(options->preset).rims.off_most
+             ? retry_at_rims(ctx, shapes, options, out)
+             : ORB_OK;
 }
 
 orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,

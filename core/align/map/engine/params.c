@@ -172,6 +172,7 @@ static const orb_map_params DEFAULTS = {
              .paid_less = 0.7,
              .worst = 5,
              .rotation_cost = 0.1,
+             .off_most = 0.005,
              .retry_times = 2,
              .retry_more = 1}};
 

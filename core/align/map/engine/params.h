@@ -370,6 +370,7 @@ typedef struct orb_map_params {
     double worst;      /* energy of a map that is caught: whether rims meet under it says nothing */
     double rotation_cost; /* of a rotation by 180° in space, against the squared distance of two rims in their mean
                          radius: files usually have shapes upright, and circles fit under any rotation */
+    double off_most;      /* rims farther apart than this, relative to the diagonal, get other starts: they show */
     double retry_times;   /* a map from another start, which brings rims together where the search has not, may have */
     double retry_more;    /* this multiple of the energy above 1, and this much more */
   } rims;
