@@ -3,7 +3,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { rigged } from '../samples/rigged.mjs';
-import { apart, ball, grating, obj, torus } from '../scenario/support/shapes.mjs';
+import { apart, ball, grating, obj, torus, withoutFace } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import { countPixels } from './pictures.mjs';
 import { button, defaultShown, json, openPage, sample, settled, until } from './support.mjs';
@@ -48,9 +48,15 @@ test('one button closes all handles, also those that the list does not show', as
   await refused(page, 'grating', surface);
   const alert = page.getByRole('alert');
   assert.match(await alert.innerText(), /Genus 1008\./);
-  assert.match(await page.getByRole('list', { name: 'Handles' }).innerText(), /1003 more$/);
+  const listed = page.getByRole('list', { name: 'Handles' });
+  assert.match(await listed.innerText(), /1\D003 more$/);
+  await page.getByRole('button', { name: /^Show all 1\D008 handles$/ }).click();
+  assert.equal(await listed.getByRole('listitem').count(), 1008);
+  assert.ok(await listed.evaluate((list) => list.scrollHeight > list.clientHeight && list.clientHeight < 300));
+  await button(page, 'Show fewer').click();
+  assert.equal(await listed.getByRole('listitem').count(), 6);
   const before = await filled(page);
-  assert.equal(await alert.getByRole('button').count(), 1);
+  assert.equal(await alert.getByRole('button').count(), 2);
   await button(page, 'Close all 1,008 handles').click();
   const mesh = await mended(page, 'grating');
   assert.equal(mesh.repairs.filter(({ kind, count }) => kind === 'close_handles' && count > 0).length, 1008);
@@ -133,19 +139,32 @@ test('loose pieces are shown in red, and the largest can be kept', async () => {
   await done();
 });
 
-test('pieces of one name are told apart, and each can be kept', async () => {
+test('pieces of one name are told apart by their nodes, and each can be kept', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const file = { name: 'body.glb', mimeType: 'model/gltf-binary', buffer: rigged().bytes };
   await page.locator('input[type=file]').first().setInputFiles(file);
   await page.locator('.card.refused').waitFor();
   assert.deepEqual(await page.getByRole('alert').getByRole('button').allInnerTexts(), [
     'Keep the largest piece',
-    'Keep “eye”, piece 1 (4 triangles)',
-    'Keep “eye”, piece 2 (4 triangles)',
+    'Keep “left eye” (4 triangles)',
+    'Keep “right eye” (4 triangles)',
   ]);
-  await button(page, 'Keep “eye”, piece 2 (4 triangles)').click();
+  await button(page, 'Keep “right eye” (4 triangles)').click();
   const mesh = await mended(page, 'body');
   assert.equal(mesh.triangles, 4);
+  await done();
+});
+
+test('of a closed body in open clothes the body can be kept', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await refused(page, 'dressed', apart(withoutFace(ball(2)), ball(1)));
+  assert.deepEqual(await page.getByRole('alert').getByRole('button').allInnerTexts(), [
+    'Fill the holes',
+    'Keep the largest piece',
+    'Keep piece 1 (32 triangles)',
+  ]);
+  await button(page, 'Keep piece 1 (32 triangles)').click();
+  assert.equal((await mended(page, 'dressed')).triangles, 32);
   await done();
 });
 

@@ -225,12 +225,14 @@ const sizeFor = (lengths: number[]) => {
   return longest > SMALL ? Number((1.01 * longest).toPrecision(3)) : longest && SMALL;
 };
 
-/** The pieces after the largest; those of one name by their numbers. */
+/** The pieces after the largest; those of one name by that of their node, or by their numbers. */
 function otherParts(parts: unknown): { repair: string; label: string }[] {
   if (!Array.isArray(parts)) return [];
-  const shared = (name?: string) => parts.filter((part) => part.name === name).length > 1;
-  return parts.slice(1).map(({ part, triangles, name }) => {
-    const title = [name && `“${name}”`, (!name || shared(name)) && `piece ${part}`].filter(Boolean).join(', ');
+  const owned = (key: 'name' | 'node', value?: string) =>
+    value && parts.filter((part) => part[key] === value).length === 1 ? value : undefined;
+  return parts.slice(1).map(({ part, triangles, name, node }) => {
+    const own = owned('name', name) ?? owned('node', node);
+    const title = own ? `“${own}”` : [name && `“${name}”`, `piece ${part}`].filter(Boolean).join(', ');
     return { repair: `safe,part:${part}`, label: `Keep ${title} (${triangles.toLocaleString('en')} triangles)` };
   });
 }
@@ -247,9 +249,11 @@ function handleRepairs(lengths: number[], genus: number): { repair: string; labe
 /** The repairs that the page offers for a refusal. */
 export function repairsFor(problem: Problem): { repair: string; label: string }[] {
   const kind = problem.type.split('/').pop();
-  if (kind === 'not-closed') return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }];
-  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components))
-    return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }, ...otherParts(problem.parts)];
+  const others = otherParts(problem.parts);
+  const pieces = [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }, ...others];
+  if (kind === 'not-closed')
+    return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }, ...(others.length ? pieces : [])];
+  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components)) return pieces;
   if (kind === 'not-manifold') return [{ repair: 'safe,split_nonmanifold', label: 'Split it there' }];
   if (kind === 'not-genus-zero') return handleRepairs(numbers(problem.loop_lengths_relative), Number(problem.genus));
   return [];

@@ -308,6 +308,7 @@ function ShapeCard({ shape, index }: { shape: Shape; index: number }) {
 }
 
 const HANDLES_SHOWN = 5;
+const HANDLES_MOST = 2000; // a longer list makes the page slow
 const PIECES_SHOWN = 5;
 
 /** A button for each repair; of very many pieces, the smaller ones on request, in a list that scrolls. */
@@ -335,6 +336,29 @@ function Mends({ shape }: { shape: Shape }) {
   );
 }
 
+/** The length of each handle's loop; of very many, the others on request, in a list that scrolls. */
+function Handles({ lengths }: { lengths: number[] }) {
+  const [all, setAll] = useState(false);
+  const listed = lengths.slice(0, all ? HANDLES_MOST : HANDLES_SHOWN);
+  return (
+    <>
+      <ul class={all ? 'facts scrolls' : 'facts'} aria-label="Handles">
+        {listed.map((length, i) => (
+          <li key={i}>
+            Handle {i + 1}: its loop is {Number((100 * length).toPrecision(2))} % of the diagonal long.
+          </li>
+        ))}
+        {lengths.length > listed.length && <li>{count(lengths.length - listed.length)} more</li>}
+      </ul>
+      {lengths.length > HANDLES_SHOWN && (
+        <Button kind="quiet" aria-expanded={all} onClick={() => setAll(!all)}>
+          {all ? 'Show fewer' : `Show all ${count(lengths.length)} handles`}
+        </Button>
+      )}
+    </>
+  );
+}
+
 function Refusal({ shape }: { shape: Shape }) {
   const problem = shape.problem!;
   const loops = problem.boundary_loops as number | undefined;
@@ -354,16 +378,7 @@ function Refusal({ shape }: { shape: Shape }) {
           {problem.offset !== undefined && `Byte ${String(problem.offset)}. `}
           {!!shape.defects && shape.model && <span class="red">Shown in red on the model.</span>}
         </p>
-        {handles.length > 0 && (
-          <ul class="facts" aria-label="Handles">
-            {handles.slice(0, HANDLES_SHOWN).map((length, i) => (
-              <li key={i}>
-                Handle {i + 1}: its loop is {Number((100 * length).toPrecision(2))} % of the diagonal long.
-              </li>
-            ))}
-            {handles.length > HANDLES_SHOWN && <li>{handles.length - HANDLES_SHOWN} more</li>}
-          </ul>
-        )}
+        {handles.length > 0 && <Handles lengths={handles} />}
         <Mends shape={shape} />
       </div>
     </div>
