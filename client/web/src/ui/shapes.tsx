@@ -311,6 +311,14 @@ const HANDLES_SHOWN = 5;
 const HANDLES_MOST = 2000; // a longer list makes the page slow
 const PIECES_SHOWN = 5;
 
+function ShowAll({ what, all, change }: { what: string; all: boolean; change: (all: boolean) => void }) {
+  return (
+    <Button kind="quiet" aria-expanded={all} onClick={() => change(!all)}>
+      {all ? 'Show fewer' : `Show all ${what}`}
+    </Button>
+  );
+}
+
 /** A button for each repair; of very many pieces, the smaller ones on request, in a list that scrolls. */
 function Mends({ shape }: { shape: Shape }) {
   const [all, setAll] = useState(false);
@@ -327,11 +335,7 @@ function Mends({ shape }: { shape: Shape }) {
         ))}
         {all && unlisted > 0 && <p class="facts">{count(unlisted)} smaller pieces are not listed.</p>}
       </div>
-      {options.length > PIECES_SHOWN && (
-        <Button kind="quiet" aria-expanded={all} onClick={() => setAll(!all)}>
-          {all ? 'Show fewer' : `Show all ${count(options.length)} pieces`}
-        </Button>
-      )}
+      {options.length > PIECES_SHOWN && <ShowAll what={`${count(options.length)} pieces`} all={all} change={setAll} />}
     </>
   );
 }
@@ -351,9 +355,7 @@ function Handles({ lengths }: { lengths: number[] }) {
         {lengths.length > listed.length && <li>{count(lengths.length - listed.length)} more</li>}
       </ul>
       {lengths.length > HANDLES_SHOWN && (
-        <Button kind="quiet" aria-expanded={all} onClick={() => setAll(!all)}>
-          {all ? 'Show fewer' : `Show all ${count(lengths.length)} handles`}
-        </Button>
+        <ShowAll what={`${count(lengths.length)} handles`} all={all} change={setAll} />
       )}
     </>
   );
