@@ -10,7 +10,9 @@
 #include "store/object_removal.h"
 #include "store/owners.h"
 #include "store/place.h"
+#include "store/several.h"
 #include "store/spheres.h"
+#include "store/verify.h"
 
 enum { PAGE = 64 };
 
@@ -23,54 +25,104 @@ typedef struct tally {
 
 static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
 
-/* Verifies an object against its hash. wanted "": the row is of an older engine and has no hash; the object must only
- * exist. */
-static void verify_object(tally *t, const resource *row, object_kind kind, const char *what, const char *wanted) {
-  unsigned char *bytes = NULL;
-  size_t size = 0;
-  char sha[API_ID_SIZE] = "";
-  if (objects_load(t->store, kind, row->id, &bytes, &size) != STORE_OK) {
-    printf("%s %s: %s cannot be read\n", names[row->kind], row->id, what);
-    t->wrong++;
-    return;
+/* An object of a page of rows, and what is wrong with it; NULL: nothing. */
+typedef struct item {
+  const resource *row;
+  named_object object;
+  const char *fault;
+  uint64_t bytes;
+} item;
+
+typedef struct page {
+  const objects *store;
+  resource rows[PAGE];
+  item items[PAGE * RESOURCE_OBJECTS];
+} page;
+
+/* Verifies an object against its hash. A row of an older engine has no hash: the object must only exist. The file of
+ * aligned spheres has its hash within itself. */
+static int verify(void *user, int k) {
+  const page *p = user;
+  item *i = &((page *)user)->items[k];
+  char sha[API_ID_SIZE];
+  int fd;
+  if (i->object.kind == OBJECT_SPHERES) {
+    i->fault = spheres_check(p->store, i->row->id) == STORE_OK ? NULL : "its aligned spheres are missing or damaged";
+    return 1;
   }
-  api_id_of_text((const char *)bytes, size, sha);
-  if (wanted[0] && strcmp(sha, wanted) != 0) {
-    printf("%s %s: %s (%zu bytes) does not match its hash\n", names[row->kind], row->id, what, size);
-    t->wrong++;
+  if (objects_read(p->store, i->object.kind, i->row->id, &fd, &i->bytes) != STORE_OK) {
+    i->fault = "cannot be read";
+    return 1;
   }
-  free(bytes);
+  if (!verify_hash(fd, sha)) {
+    i->fault = "cannot be read";
+  } else if (i->object.sha[0] && strcmp(sha, i->object.sha) != 0) {
+    i->fault = "does not match its hash";
+  }
+  close(fd);
+  return 1;
 }
 
-static void verify(tally *t, const resource *row) {
-  named_object named[RESOURCE_OBJECTS];
-  int count = resource_objects(row, named);
-  t->rows++;
+static void tell(const item *i) {
+  if (i->object.kind == OBJECT_SPHERES) {
+    printf("supermesh %s: %s\n", i->row->id, i->fault);
+  } else if (i->bytes) {
+    printf("%s %s: %s (%llu bytes) %s\n", names[i->row->kind], i->row->id, i->object.what, (unsigned long long)i->bytes,
+           i->fault);
+  } else {
+    printf("%s %s: %s %s\n", names[i->row->kind], i->row->id, i->object.what, i->fault);
+  }
+}
+
+/* Verifies all objects of the first `rows` rows of a page at once. */
+static void verify_page(tally *t, page *p, int rows) {
+  int count = 0;
+  for (int r = 0; r < rows; r++) {
+    named_object named[RESOURCE_OBJECTS];
+    int many = resource_objects(&p->rows[r], named);
+    for (int i = 0; i < many; i++) {
+      p->items[count++] = (item){.row = &p->rows[r], .object = named[i]};
+    }
+  }
+  t->rows += rows;
+  several_run(count, verify, p);
   for (int i = 0; i < count; i++) {
-    if (named[i].kind != OBJECT_SPHERES) {
-      verify_object(t, row, named[i].kind, named[i].what, named[i].sha);
-    } else if (spheres_check(t->store, row->id) != STORE_OK) {
-      printf("supermesh %s: its aligned spheres are missing or damaged\n", row->id);
+    if (p->items[i].fault) {
+      tell(&p->items[i]);
       t->wrong++;
     }
   }
 }
 
-static void each_row(tally *t, resource_kind kind) {
-  resource rows[PAGE];
+static void each_row(tally *t, page *p, resource_kind kind) {
   int64_t before = 0;
   for (int n = PAGE; n == PAGE;) {
-    n = catalogue_list(t->cat, kind, before, PAGE, rows);
+    n = catalogue_list(t->cat, kind, before, PAGE, p->rows);
     if (n < 0) {
       puts("the rows of the catalogue cannot be read");
       t->wrong++;
+      return;
     }
+    verify_page(t, p, n);
     for (int i = 0; i < n; i++) {
-      before = rows[i].seq;
-      verify(t, &rows[i]);
-      resource_free(&rows[i]);
+      before = p->rows[i].seq;
+      resource_free(&p->rows[i]);
     }
   }
+}
+
+static void each_resource(tally *t) {
+  page *p = calloc(1, sizeof *p);
+  if (!p) {
+    puts("out of memory");
+    t->wrong++;
+    return;
+  }
+  p->store = t->store;
+  for (int kind = 0; kind < RESOURCE_KINDS; kind++) {
+    each_row(t, p, (resource_kind)kind);
+  }
+  free(p);
 }
 
 /* The object may be published again meanwhile. What is in S3 is fetched before others have to wait. */
@@ -130,9 +182,7 @@ int maintain_check(const config *options) {
     puts("the catalogue has rows with invalid values");
     t.wrong++;
   }
-  for (int kind = 0; kind < RESOURCE_KINDS; kind++) {
-    each_row(&t, (resource_kind)kind);
-  }
+  each_resource(&t);
   if (objects_each(t.store, each_object, &t) != STORE_OK) {
     puts("some folders of objects cannot be read");
     t.wrong++;

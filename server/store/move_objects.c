@@ -2,7 +2,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <pthread.h>
 #include <sodium.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,11 +12,11 @@
 #include "log.h"
 #include "store/object_removal.h"
 #include "store/rows.h"
+#include "store/several.h"
 #include "store/spheres.h"
 
 enum {
   BATCH = 64,         /* rows; each has at most RESOURCE_OBJECTS objects */
-  THREADS = 8,        /* S3 answers one request in some 20 ms, and many at once */
   BLOCK = 1 << 18,    /* bytes read at a time */
   AWAY_SECONDS = 300, /* how long S3 may be unreachable before the move gives up */
 };
@@ -37,7 +36,6 @@ typedef struct batch {
   resource rows[BATCH];
   item items[BATCH * RESOURCE_OBJECTS];
   int row_count, count;
-  int next, stopped; /* __atomic */
 } batch;
 
 /* The hash of an object. A bucket gives it without sending the object. */
@@ -194,30 +192,15 @@ static store_result move_item(const object_move *m, item *i) {
   return result;
 }
 
-static void *work(void *user) {
+static int move_one(void *user, int k) {
   batch *b = user;
-  for (int k; !__atomic_load_n(&b->stopped, __ATOMIC_RELAXED) &&
-              (k = __atomic_fetch_add(&b->next, 1, __ATOMIC_RELAXED)) < b->count;) {
-    b->items[k].result = move_item(b->m, &b->items[k]);
-    if (b->items[k].result != STORE_OK) {
-      __atomic_store_n(&b->stopped, 1, __ATOMIC_RELAXED);
-    }
-  }
-  return NULL;
+  b->items[k].result = move_item(b->m, &b->items[k]);
+  return b->items[k].result == STORE_OK;
 }
 
 /* Moves all objects of a batch at once. */
 static store_result move_batch(batch *b) {
-  pthread_t threads[THREADS];
-  int started = 0;
-  b->next = b->stopped = 0;
-  while (started < THREADS - 1 && pthread_create(&threads[started], NULL, work, b) == 0) {
-    started++;
-  }
-  work(b);
-  for (int i = 0; i < started; i++) {
-    pthread_join(threads[i], NULL);
-  }
+  several_run(b->count, move_one, b);
   for (int k = 0; k < b->count; k++) {
     if (b->items[k].result != STORE_OK) {
       return b->items[k].result;
