@@ -33,17 +33,17 @@ typedef struct item {
   uint64_t bytes;
 } item;
 
-typedef struct page {
+typedef struct row_page {
   const objects *store;
   resource rows[PAGE];
   item items[PAGE * RESOURCE_OBJECTS];
-} page;
+} row_page;
 
 /* Verifies an object against its hash. A row of an older engine has no hash: the object must only exist. The file of
  * aligned spheres has its hash within itself. */
 static int verify(void *user, int k) {
-  const page *p = user;
-  item *i = &((page *)user)->items[k];
+  const row_page *p = user;
+  item *i = &((row_page *)user)->items[k];
   char sha[API_ID_SIZE];
   int fd;
   if (i->object.kind == OBJECT_SPHERES) {
@@ -75,7 +75,7 @@ static void tell(const item *i) {
 }
 
 /* Verifies all objects of the first `rows` rows of a page at once. */
-static void verify_page(tally *t, page *p, int rows) {
+static void verify_page(tally *t, row_page *p, int rows) {
   int count = 0;
   for (int r = 0; r < rows; r++) {
     named_object named[RESOURCE_OBJECTS];
@@ -94,7 +94,7 @@ static void verify_page(tally *t, page *p, int rows) {
   }
 }
 
-static void each_row(tally *t, page *p, resource_kind kind) {
+static void each_row(tally *t, row_page *p, resource_kind kind) {
   int64_t before = 0;
   for (int n = PAGE; n == PAGE;) {
     n = catalogue_list(t->cat, kind, before, PAGE, p->rows);
@@ -112,7 +112,7 @@ static void each_row(tally *t, page *p, resource_kind kind) {
 }
 
 static void each_resource(tally *t) {
-  page *p = calloc(1, sizeof *p);
+  row_page *p = calloc(1, sizeof *p);
   if (!p) {
     puts("out of memory");
     t->wrong++;

@@ -1,4 +1,4 @@
-/* The entry: checks the request and chooses between given.c and auto.c. */
+/* The entry: checks the request and chooses between given/ and auto.c. */
 #include "orbmorph/align.h"
 
 #include <math.h>

@@ -13,9 +13,11 @@
  *            filled holes that correspond, which lie on each other afterwards
  *   find/    matches, without landmarks or in agreement with them; given landmarks that may be misplaced
  *            (find/suspects.h)
- *   given.c  one method with the given landmarks, then the composed map; soft landmarks are released at the end
+ *   given/   method.c: one method with the given landmarks, and the composed maps of an alignment; by_landmarks.c: two
+ *            ways to align by landmarks, of which the better one wins; given.c: one of these, then soft landmarks are
+ *            released, and copies are extended to their shapes
  *   auto.c   method `auto`: the rotation search, composed towards the matches of find/
- *   align.c  orb_align(): checks the request, chooses between given.c and auto.c, and aligns copies of large shapes
+ *   align.c  orb_align(): checks the request, chooses between given/ and auto.c, and aligns copies of large shapes
  *
  * The main header of each folder says what comes in, what goes out, and in which order to read its files:
  * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, map/rims/rims.h, find/match.h.
@@ -25,6 +27,17 @@
 
 #include "align/map/compose.h"
 #include "align/sheet/copies.h"
+
+/* Working copies with the landmarks as vertices, aligned by options->method and certified; no map is composed. */
+ORB_MUST_CHECK orb_status orb_align_by_method(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                              const orb_landmark *landmarks, int32_t landmark_count,
+                                              const orb_align_options *options, orb_alignment *out);
+
+/* Working copies in which the landmarks meet, by pins or by a match, with their maps composed. Soft landmarks are held
+ * like the others. */
+ORB_MUST_CHECK orb_status orb_align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                                 const orb_landmark *landmarks, int32_t landmark_count,
+                                                 const orb_align_options *options, orb_alignment *out);
 
 /* orb_align() for one method with the given landmarks; `auto` without landmarks is the rotation search here. */
 ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,

@@ -2,7 +2,7 @@
 #ifndef ORB_ELASTIC_CARRY_H
 #define ORB_ELASTIC_CARRY_H
 
-#include "elastic/elastic.h"
+#include "elastic/pose.h"
 
 /* Carries a pose of a coarse mesh to points beside it: each point moves with the corners of its nearest triangle.
  * points: 3 each. out->rotation may be NULL. O(count log n), on all threads. */

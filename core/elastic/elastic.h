@@ -9,7 +9,11 @@
  *   body.h      a mesh with what the steps read
  *   stretch.h   how the surroundings of a vertex are stretched
  *   relief.h    how far a vertex stands out from its surroundings
+ *   pose.h      what leads the first mesh, and where it is
+ *   registration.h, rough_map.h, places.h, rounds.h
+ *               what a registration holds, what pulls it, and its rounds
  *   elastic.h   the registration
+ *   slide.h     along the other surface, from where a map takes the first one
  *   carry.h     its pose, for other points
  *
  * Source: Sorkine & Alexa 2007 (as-rigid-as-possible energy: rotations of vertices and positions take turns), with
@@ -18,32 +22,7 @@
 #ifndef ORB_ELASTIC_ELASTIC_H
 #define ORB_ELASTIC_ELASTIC_H
 
-#include "orbmorph/mesh.h"
-
-/* A rough map between two meshes, both ways: for each vertex of one, a vertex of the other. */
-typedef struct orb_rough_map {
-  const int32_t *forth; /* of the second mesh, for each vertex of the first */
-  const int32_t *back;  /* of the first mesh, for each vertex of the second */
-} orb_rough_map;
-
-/* A point of the first mesh that belongs at a place of the second one. */
-typedef struct orb_elastic_anchor {
-  int32_t vertex;   /* of the first mesh, near the point */
-  double offset[3]; /* from the vertex to the point, in the mesh as given */
-  double place[3];  /* where the point belongs */
-} orb_elastic_anchor;
-
-/* A NULL pointer to them means none. */
-typedef struct orb_elastic_anchors {
-  int32_t count;
-  const orb_elastic_anchor *one;
-} orb_elastic_anchors;
-
-/* Where the first mesh is. The caller owns both. */
-typedef struct orb_elastic_pose {
-  double *position; /* 3 per vertex */
-  double *rotation; /* 9 per vertex, row-major: of its surroundings, from the mesh as given */
-} orb_elastic_pose;
+#include "elastic/pose.h"
 
 /* Moves mesh a to mesh b along a rough map, then to the nearest places, and its anchors, if any, to theirs. Both meshes
  * are scaled to the same area, near 4π, and have no vertex without triangles. Fills the pose. *bend: mean squared
@@ -58,11 +37,5 @@ ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh 
  * least 2. Changes the pose. On all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                              const orb_elastic_anchors *anchors, int rounds, orb_elastic_pose *pose);
-
-/* Slides mesh a over mesh b until the two fit each other in space, from where a map takes its vertices. A map of little
- * energy knows lengths only; a slide knows bumps and hollows as well. Both meshes are as in orb_elastic_register().
- * Changes the positions, 3 per vertex. O(n · m) a round, 10 to 40 rounds, as long as it moves. On all threads. */
-ORB_MUST_CHECK orb_status orb_elastic_slide(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                                            const orb_elastic_anchors *anchors, double *position);
 
 #endif

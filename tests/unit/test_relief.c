@@ -8,8 +8,8 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
-#include "elastic/elastic.h"
 #include "elastic/relief.h"
+#include "elastic/slide.h"
 #include "numeric/vec3.h"
 #include "support_context.h"
 #include "support_shapes.h"
@@ -190,7 +190,7 @@ static void steps_lead_to_the_same_height(void **state) {
 static double slid(double angle) {
   orb_mesh a = bumpy(4, 1), b = bumpy(4, 1), start = bumpy(4, 0);
   double off = 0;
-  int count = 0;
+  int count = 0, fits;
   for (int32_t v = 0; v < start.vertex_count; v++) {
     double *p = start.positions + 3 * (size_t)v;
     const double x = cos(angle) * p[0] - sin(angle) * p[1], y = sin(angle) * p[0] + cos(angle) * p[1];
@@ -199,7 +199,8 @@ static double slid(double angle) {
       p[k] = r * d[k];
     }
   }
-  assert_int_equal(orb_elastic_slide(ctx, &a, &b, NULL, start.positions), ORB_OK);
+  assert_int_equal(orb_elastic_slide(ctx, &a, &b, NULL, start.positions, &fits), ORB_OK);
+  assert_true(fits);
   for (int32_t v = 0; v < a.vertex_count; v++) {
     const double *p = a.positions + 3 * (size_t)v;
     if (orb_dot(p, bump[0]) > 0.97 || orb_dot(p, bump[1]) > 0.97) {

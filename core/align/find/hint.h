@@ -4,7 +4,7 @@
 #define ORB_ALIGN_FIND_HINT_H
 
 #include "align/sheet/copy.h"
-#include "elastic/elastic.h"
+#include "elastic/pose.h"
 
 /* Vertices of the two given meshes that correspond. */
 typedef struct orb_match_hint {

@@ -10,6 +10,7 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "elastic/carry.h"
+#include "elastic/elastic.h"
 #include "numeric/vec3.h"
 
 _Static_assert((int)ORB_TRIALS_LISTED == 1 + (int)ORB_MATCH_OTHERS, "a match has all listed trials");

@@ -20,6 +20,7 @@
 #include "base/context.h"
 #include "base/memory.h"
 #include "elastic/carry.h"
+#include "elastic/elastic.h"
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
 

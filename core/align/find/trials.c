@@ -10,6 +10,7 @@
 #include "base/context.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "elastic/elastic.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"

@@ -327,10 +327,12 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
                    .given_target = guide->target,
                    .keeps_angles = guide->keeps_angles,
                    .beat = guide->beat,
+                   .rival = guide->rival,
                    .wants_course = guide->course != NULL,
                    .walks_first = guide->walks_first && both,
                    .springs = guide->springs,
                    .hopeless = INFINITY,
+                   .settled = INFINITY,
                    .twisted_energy = INFINITY};
   int swap = 0;
   *improved = 0;

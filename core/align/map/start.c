@@ -90,7 +90,7 @@ done:
 }
 
 orb_status orb_map_run_passes(orb_map_run *c, int draws) {
-  double last = INFINITY;
+  double last = c->best_energy < c->settled ? INFINITY : 0;
   while (c->best_energy < c->params.work.pass_gain * last && c->passes-- > 0 && c->work > 0) {
     last = c->best_energy;
     ORB_TRY(orb_map_register(c, c->params.registration.samples));
@@ -103,6 +103,9 @@ orb_status orb_map_run_passes(orb_map_run *c, int draws) {
     if (draws && !(c->best_energy < last)) {
       ORB_TRY(orb_map_run_start(c, ORB_MAP_DRAWN));
     }
+  }
+  if (c->best_energy >= c->params.work.pass_gain * last) {
+    c->settled = c->best_energy;
   }
   return ORB_OK;
 }

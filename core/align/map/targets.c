@@ -131,20 +131,33 @@ static orb_status run_first(orb_map_run *c, int *walked) {
   return ORB_OK;
 }
 
-/* Continues from the first start, until there is a map of shapes that correspond. */
+/* Is there a map that landmarks hold in the right basin? Other starts then come to no other. */
+static int is_held(const orb_map_run *c) {
+  return c->pairs.landmarks > 0 && c->best_energy <= c->params.targets.hopeless;
+}
+
+/* Continues from the first start, until there is a map of shapes that correspond, or the rival has a better one. */
 static orb_status run_starts(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   if (c->best_energy > smooth_energy(c) && c->best_energy <= p->targets.crumpled) {
     ORB_TRY(draw(c));
   }
+  if (c->rival.ask && c->best_energy > p->energy.good) {
+    int goes_on;
+    ORB_TRY(c->rival.ask(c->rival.user, c->best_energy, &goes_on));
+    c->course.is_beaten = !goes_on;
+    if (!goes_on) {
+      return ORB_OK;
+    }
+  }
   if (c->best_energy > p->energy.poor) {
     ORB_TRY(run_passes(c));
     ORB_TRY(orb_map_register(c, 0));
   }
-  if (c->best_energy > p->energy.poor) {
+  if (c->best_energy > p->energy.poor && !is_held(c)) {
     ORB_TRY(start_coarser(c));
   }
-  return c->best_energy > p->energy.poor ? start_from_others(c) : ORB_OK;
+  return c->best_energy > p->energy.poor && !is_held(c) ? start_from_others(c) : ORB_OK;
 }
 
 /* A walk has few crumples, which draws would smooth. */
@@ -192,6 +205,9 @@ orb_status orb_map_follow_targets(orb_map_run *c) {
   }
   if (!walked) {
     ORB_TRY(run_starts(c));
+    if (c->course.is_beaten) {
+      return ORB_OK;
+    }
     if (c->both && !c->walks_first && c->best_energy > c->params.targets.walked) {
       ORB_TRY(walk_last(c, &walked));
     }

@@ -4,6 +4,19 @@
 
 #include "align/sheet/sheet.h"
 
+/* Does a spring hold the landmark instead of a pin? */
+static inline int orb_landmark_is_soft(const orb_landmark *landmark) {
+  return landmark->weight > 0 && landmark->weight < 1;
+}
+
+static inline int32_t orb_landmarks_soft(const orb_landmark *landmarks, int32_t count) {
+  int32_t soft = 0;
+  for (int32_t l = 0; l < count; l++) {
+    soft += orb_landmark_is_soft(&landmarks[l]);
+  }
+  return soft;
+}
+
 /* Makes each landmark a vertex: splits the triangle or edge in which it lies if it is not a vertex yet. Places are on
  * the mesh from which the (unsplit) sheet was made; a coordinate below 2e-7 counts as zero. Fills landmark_vertices,
  * which the shape owns. shape_index is for the error. ORB_E_BAD_LANDMARKS names places that are out of range, or for

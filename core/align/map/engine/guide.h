@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "embed/newton/hierarchy.h"
+#include "orbmorph/status.h"
 
 /* What the first spatial targets of a composed map follow. */
 typedef enum orb_map_from {
@@ -36,7 +37,7 @@ typedef struct orb_map_level_map {
 typedef struct orb_map_course {
   double first_bulk, bulk; /* after the first start, and at last */
   int is_walked;           /* the first start is a landmark walk */
-  int is_beaten;           /* the first start does not beat what it must beat, and is the last */
+  int is_beaten;           /* the first start does not beat what it must beat, or the rival, and is the last */
 } orb_map_course;
 
 /* What a first start must beat; otherwise it is the last. 0: nothing. */
@@ -44,6 +45,13 @@ typedef struct orb_map_beat {
   double bulk;   /* of a start from targets */
   double energy; /* of a walk */
 } orb_map_beat;
+
+/* Asks the caller whether a start from targets that has led to a map of this energy is worth more work. The caller may
+ * compose another map meanwhile. */
+typedef struct orb_map_rival {
+  orb_status (*ask)(void *user, double energy, int *goes_on); /* NULL: it goes on */
+  void *user;
+} orb_map_rival;
 
 /* What guides a composed map. */
 typedef struct orb_map_guide {
@@ -54,6 +62,7 @@ typedef struct orb_map_guide {
                            the targets are smoothed */
   orb_map_beat beat;    /* with a target */
   orb_map_course *course; /* with a target: NULL, or set */
+  orb_map_rival rival;    /* with a target: asked if the first start has led to no good map */
   int walks_first; /* with a target and `both`: a walk is tried before the start from the targets, and in its place
                     where it leads to a map */
   orb_map_springs springs; /* with ORB_MAP_FROM_PINS, ORB_MAP_FROM_SPRINGS and ORB_MAP_FROM_COPY */

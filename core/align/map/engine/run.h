@@ -51,6 +51,7 @@ typedef struct orb_map_run {
   double *x, *normal;         /* moving shape, area 4π */
   int keeps_angles;           /* see orb_map_guide */
   orb_map_beat beat;          /* see orb_map_guide */
+  orb_map_rival rival;        /* see orb_map_guide */
   int walks_first;            /* see orb_map_guide */
   orb_map_course course;      /* see orb_map_guide; its bulks are measured only if asked for */
   int wants_course;           /* whether they are asked for */
@@ -75,6 +76,7 @@ typedef struct orb_map_run {
   int32_t hopeless_flips; /* a start with more than one flip in this many triangles is given up */
   double twisted_energy;  /* of the last map that was to be untwisted */
   int passes;             /* registrations through samples of the best map that are left */
+  double settled;         /* energy of the map that the last pass brought no further: another pass would not either */
   int64_t work;           /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
 

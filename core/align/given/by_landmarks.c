@@ -1,0 +1,285 @@
+/* Alignment by landmarks. Two ways compete: pins (pin/), and a match in which all limbs lie where one body in two poses
+ * has them (find/match.c), which the landmarks only draw. Whichever leads to the better map wins. */
+#include <math.h>
+#include <string.h>
+
+#include "align/find/match.h"
+#include "align/find/params.h"
+#include "align/map/engine/params.h"
+#include "align/methods.h"
+#include "align/sheet/even.h"
+#include "align/sheet/landmarks.h"
+#include "align/sheet/sheet.h"
+#include "base/check.h"
+#include "base/memory.h"
+#include "numeric/vec3.h"
+
+/* Orders the landmarks so that each is as far as possible from those before it, on the first shape. vertex: theirs on
+ * two shapes. O(landmarks²). */
+static orb_status spread_landmarks(orb_context *ctx, const double *positions, int32_t count, int32_t *vertex[2]) {
+  double *far = ORB_NEW(ctx, double, count);
+  if (!far) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    int32_t best = i;
+    for (int32_t l = i; l < count; l++) {
+      const double *p = positions + 3 * (size_t)vertex[0][l];
+      far[l] = i == 0 ? INFINITY : fmin(far[l], orb_distance2(p, positions + 3 * (size_t)vertex[0][i - 1]));
+      best = far[l] > far[best] ? l : best;
+    }
+    far[best] = far[i];
+    for (int s = 0; s < 2; s++) {
+      const int32_t chosen = vertex[s][best];
+      vertex[s][best] = vertex[s][i];
+      vertex[s][i] = chosen;
+    }
+  }
+  orb_free(ctx, far);
+  return ORB_OK;
+}
+
+/* The landmarks of the first shape and of shape s: first those that are exact, spread, then those that are soft.
+ * Returns the number of the exact ones. */
+static int32_t list_landmarks(const orb_landmark *landmarks, const orb_alignment *a, int32_t s, int32_t *vertex[2]) {
+  const int32_t count = a->landmark_count, exact = count - orb_landmarks_soft(landmarks, count);
+  int32_t next[2] = {0, exact};
+  for (int32_t l = 0; l < count; l++) {
+    const int32_t at = next[orb_landmark_is_soft(&landmarks[l])]++;
+    vertex[0][at] = a->shapes[0].landmark_vertices[l];
+    vertex[1][at] = a->shapes[s].landmark_vertices[l];
+  }
+  return exact;
+}
+
+/* The result of a match before anything is pinned. */
+typedef struct posed {
+  orb_alignment alignment; /* empty, unless it is found */
+  double worst;            /* the largest energy of its maps */
+  int is_found;
+  int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body */
+} posed;
+
+static void posed_free(orb_context *ctx, posed *p) {
+  orb_alignment_free(ctx, &p->alignment);
+  p->is_found = 0;
+}
+
+/* What the two ways share. */
+typedef struct contest {
+  orb_context *ctx;
+  const orb_align_shape *shapes;
+  int32_t shape_count;
+  const orb_landmark *landmarks;
+  int32_t landmark_count;
+  const orb_align_options *options;
+  posed posed;
+  orb_alignment pinned; /* once has_tried_pins; empty if the pins have no room */
+  int has_tried_pins, lacks_room;
+  int walked; /* the pins of two shapes meet in a map that a landmark walk has led to */
+} contest;
+
+/* Pins the landmarks, and improves the alignment of two shapes by a landmark walk. Its energy is INFINITY without one.
+ */
+static orb_status try_pins(contest *c) {
+  orb_alignment *a = &c->pinned;
+  if (c->has_tried_pins) {
+    return ORB_OK;
+  }
+  c->has_tried_pins = 1;
+  orb_status status =
+      orb_align_by_method(c->ctx, c->shapes, c->shape_count, c->landmarks, c->landmark_count, c->options, a);
+  c->lacks_room = orb_alignment_lacks_room(c->ctx, status);
+  if (status != ORB_OK) {
+    return c->lacks_room ? ORB_OK : status;
+  }
+  a->energy = INFINITY;
+  if (c->shape_count == 2) {
+    const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK};
+    double energies[2];
+    ORB_TRY(orb_compose(c->ctx, &a->shapes[0], &a->shapes[1], 1, a->landmark_count, &walk, c->options->preset, energies,
+                        &c->walked));
+    a->energy = energies[1];
+  }
+  return ORB_OK;
+}
+
+/* Is a pose whose first map has this energy worth more work? Only if the pins have no better map. */
+static orb_status ask_pins(void *user, double energy, int *goes_on) {
+  contest *c = user;
+  ORB_TRY(try_pins(c));
+  const double poor = orb_map_params_of(c->options->preset).energy.poor;
+  *goes_on = !c->walked || c->pinned.energy > poor || c->pinned.energy > energy;
+  return ORB_OK;
+}
+
+/* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
+ * partners, with all of them pinned. Soft landmarks exclude matches only if too few are exact. sure: that of the hint.
+ * Raises the pose's worst energy, to INFINITY if there is no such match, or no such map. */
+static orb_status compose_posed(contest *c, int32_t s, double sure, int keeps_angles) {
+  orb_context *ctx = c->ctx;
+  posed *p = &c->posed;
+  orb_alignment *a = &p->alignment;
+  orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
+  const int32_t count = a->landmark_count;
+  const orb_preset preset = c->options->preset;
+  const int competes = c->shape_count == 2 && preset != ORB_PRESET_QUALITY;
+  int32_t *vertex[2] = {ORB_NEW(ctx, int32_t, count), ORB_NEW(ctx, int32_t, count)};
+  orb_match match = {0};
+  double energies[2] = {INFINITY, INFINITY};
+  int improved = 0;
+  orb_status status = vertex[0] && vertex[1] ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  const int32_t exact = list_landmarks(c->landmarks, a, s, vertex);
+  const int32_t spread = exact >= ORB_FIND_HINT_LEAST ? exact : count;
+  ORB_GO(status, spread_landmarks(ctx, fixed->mesh.positions, spread, vertex), done);
+  const orb_match_hint hint = {.count = count,
+                               .few = spread < ORB_FIND_HINT_FEW ? spread : ORB_FIND_HINT_FEW,
+                               .first = vertex[0],
+                               .second = vertex[1],
+                               .stretch = ORB_FIND_HINT_STRETCH_MOST,
+                               .sure = sure};
+  ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match), done);
+  p->is_unsure |= match.is_unsure;
+  if (match.is_found) {
+    const int walks_first = competes && match.bend > ORB_FIND_WALKS_FIRST;
+    const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE,
+                                 .target = match.target,
+                                 .keeps_angles = keeps_angles,
+                                 .rival = {competes ? ask_pins : NULL, c},
+                                 .beat = {.energy = walks_first && c->walked ? c->pinned.energy : 0},
+                                 .walks_first = walks_first};
+    ORB_GO(status, orb_compose(ctx, fixed, moving, walks_first, count, &guide, preset, energies, &improved), done);
+  }
+  const double energy = improved ? energies[1] : INFINITY;
+  a->energy += energy / (a->shape_count - 1);
+  p->worst = fmax(p->worst, energy);
+done:
+  orb_match_free(ctx, &match);
+  orb_free(ctx, vertex[0]);
+  orb_free(ctx, vertex[1]);
+  return status;
+}
+
+static orb_status compose_all_posed(contest *c, double sure) {
+  orb_context *ctx = c->ctx;
+  posed *p = &c->posed;
+  orb_align_options rotated = *c->options;
+  rotated.method = ORB_ALIGN_ROTATE;
+  orb_even_shapes even = {0};
+  int alike;
+  orb_status status;
+  ORB_GO(status,
+         orb_align_by_method(ctx, c->shapes, c->shape_count, c->landmarks, c->landmark_count, &rotated, &p->alignment),
+         end);
+  ORB_GO(status, orb_align_are_alike(ctx, &p->alignment, rotated.preset, &alike), end);
+  if (!alike) {
+    orb_alignment_free(ctx, &p->alignment);
+    ORB_GO(status, orb_even_shapes_create(ctx, c->shapes, c->shape_count, &even), end);
+    ORB_GO(
+        status,
+        orb_align_by_method(ctx, even.shapes, c->shape_count, c->landmarks, c->landmark_count, &rotated, &p->alignment),
+        end);
+  }
+  p->alignment.energy = 0;
+  for (int32_t s = 1; s < c->shape_count && p->worst < INFINITY && status == ORB_OK; s++) {
+    status = compose_posed(c, s, sure, !alike);
+  }
+end:
+  orb_even_shapes_free(ctx, &even);
+  return status;
+}
+
+/* Aligns shapes that are one body in several poses. The map starts on spheres that keep angles, as without landmarks.
+ * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
+ * the surface between them. sure: that of orb_match_hint. Nothing is found if the landmarks do not show one body, if
+ * there is no map, or if such a sphere has no room for a landmark; pins can meet if the given sphere has room. */
+static orb_status try_pose(contest *c, double sure) {
+  posed *p = &c->posed;
+  memset(p, 0, sizeof *p);
+  orb_status status = compose_all_posed(c, sure);
+  p->is_found = status == ORB_OK && p->worst < INFINITY;
+  if (!p->is_found) {
+    posed_free(c->ctx, p);
+  }
+  return orb_alignment_lacks_room(c->ctx, status) ? ORB_OK : status;
+}
+
+/* Leaves the better of the two in c->pinned. */
+static void keep_better(contest *c) {
+  if (c->posed.is_found) {
+    orb_alignment_keep_better(c->ctx, &c->pinned, &c->posed.alignment);
+    c->posed.is_found = 0;
+  }
+}
+
+/* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a
+ * match may lead to a better one, even if the landmarks show one body less clearly. All other starts are for shapes for
+ * which neither works. */
+static orb_status improve(contest *c) {
+  const orb_preset preset = c->options->preset;
+  const orb_map_params params = orb_map_params_of(preset);
+  const double good = params.energy.good, poor = params.energy.poor;
+  posed *p = &c->posed;
+  if (p->is_unsure && !p->is_found && c->pinned.energy > poor) {
+    ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH_MOST));
+  }
+  const double energy = c->pinned.energy;
+  const int agree = c->walked && fabs(p->worst - energy) <= ORB_FIND_POSED_AGREE * energy;
+  const int is_done =
+      p->is_found ? fmin(energy, p->worst) <= ORB_FIND_POSED_POOR || agree : c->walked || energy <= good;
+  if (is_done) {
+    keep_better(c);
+  }
+  if (preset == ORB_PRESET_QUALITY || !is_done) {
+    ORB_TRY(orb_compose_all(c->ctx, &c->pinned, ORB_MAP_FROM_SPACE, NULL, preset));
+  }
+  keep_better(c);
+  return ORB_OK;
+}
+
+/* Whether a match makes pins needless. With more than two shapes, no walk competes with it. */
+static int is_enough(const contest *c) {
+  const double most = c->shape_count > 2 ? ORB_FIND_POSED_POOR : orb_map_params_of(c->options->preset).energy.good;
+  return c->posed.is_found && c->options->preset != ORB_PRESET_QUALITY && c->posed.worst <= most;
+}
+
+static orb_status hold(contest *c) {
+  if (c->landmark_count >= ORB_FIND_HINT_LEAST) {
+    ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH));
+  }
+  if (is_enough(c)) {
+    return ORB_OK;
+  }
+  ORB_TRY(try_pins(c));
+  return c->lacks_room ? ORB_OK : improve(c);
+}
+
+/* If the landmarks show one body in two poses, a match comes first: it knows the surface between the landmarks, and if
+ * its map is good, nothing is pinned. For 35 pairs of animals of one kind, landmark walks with 8 true landmarks have up
+ * to three times the error of matches without any. If the match's map is less good and the pins cannot meet, it is
+ * kept: it takes each landmark to its partner too. */
+orb_status orb_align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                  const orb_landmark *landmarks, int32_t landmark_count,
+                                  const orb_align_options *options, orb_alignment *out) {
+  contest c = {.ctx = ctx,
+               .shapes = shapes,
+               .shape_count = shape_count,
+               .landmarks = landmarks,
+               .landmark_count = landmark_count,
+               .options = options};
+  orb_status status = hold(&c);
+  orb_alignment *winner = c.posed.is_found ? &c.posed.alignment : &c.pinned;
+  memset(out, 0, sizeof *out);
+  if (status == ORB_OK && winner->shapes) {
+    *out = *winner;
+    memset(winner, 0, sizeof *winner);
+  } else if (status == ORB_OK) { /* again, for the error */
+    status = orb_align_by_method(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+  }
+  orb_alignment_free(ctx, &c.pinned);
+  posed_free(ctx, &c.posed);
+  return status;
+}
