@@ -30,17 +30,37 @@ test('the unit is sandboxed', { skip: lacks('systemd-analyze') }, () => {
   assert.match(run('systemd-analyze', ['security', '--offline=true', '--no-pager', open]).text, /level for .*: 1\.2 /);
   assert.doesNotMatch(run('systemd-analyze', ['verify', open]).text, /Unknown|Failed to parse|Invalid|ignoring/i);
   rmSync(path.dirname(open), { recursive: true });
-  const node = path.join(mkdtempSync(path.join(tmpdir(), 'orbmorph-unit-')), 'orbmorphd.service');
-  const [before, after] = readFileSync(path.join(root, 'deploy/cluster/node.conf'), 'utf8').split('[Service]\n');
-  const both = readFileSync(unit, 'utf8').replace(/^\[Service\]$/m, `${before.split('[Unit]\n')[1]}\n$&`);
-  writeFileSync(node, both.replace(/^\[Install\]$/m, `${after}\n$&`));
-  assert.doesNotMatch(run('systemd-analyze', ['verify', node]).text, /Unknown|Failed to parse|Invalid|ignoring/i);
-  rmSync(path.dirname(node), { recursive: true });
   // 20: systemd-analyze refuses a worse score.
   assert.equal(run('systemd-analyze', ['security', '--offline=true', '--no-pager', '--threshold=20', unit]).status, 0);
   const verified = run('systemd-analyze', ['verify', unit, path.join(root, 'deploy/orbmorphd.socket')]).text;
   assert.doesNotMatch(verified, /Unknown|Failed to parse|Invalid|ignoring/i);
   assert.match(readFileSync(unit, 'utf8'), /^StartLimitBurst=\d+$[\s\S]*^MemoryMax=\d+%$/m);
+});
+
+test('the units by role have the sandbox of the single daemon', { skip: lacks('systemd-analyze') }, () => {
+  const single = readFileSync(path.join(root, 'deploy/orbmorphd.service'), 'utf8');
+  const template = path.join(root, 'deploy/cluster/orbmorphd@.service');
+  const text = readFileSync(template, 'utf8');
+  const sandbox = (unit) => /^# Sandbox:[\s\S]*^SystemCallFilter=.*$/m.exec(unit)[0];
+  assert.equal(sandbox(text), sandbox(single));
+  const [, most] = /^TimeoutStopSec=(\d+)$/m.exec(text);
+  const [, drains] = /^drain-seconds = (\d+)$/m.exec(cluster('work.conf'));
+  assert.ok(Number(most) > Number(drains));
+  const place = mkdtempSync(path.join(tmpdir(), 'orbmorph-unit-'));
+  writeFileSync(path.join(place, 's3-keys'), 'aws_access_key_id = a\naws_secret_access_key = b\n');
+  for (const role of ['serve', 'work']) {
+    const unit = path.join(place, `orbmorphd@${role}.service`);
+    writeFileSync(unit, text.replace('/usr/bin/orbmorphd', binaries.daemon));
+    const verified = run('systemd-analyze', ['verify', '--man=no', unit]);
+    assert.deepEqual([verified.status, verified.text], [0, '']);
+    // What systemd makes of %i is a command that the daemon takes.
+    const [, command] = /^ExecStart=\S+ (.*)$/m.exec(text);
+    writeFileSync(path.join(place, `${role}.conf`), cluster(`${role}.conf`).replaceAll('/etc/orbmorph', place));
+    const args = command.replaceAll('/etc/orbmorph', place).replaceAll('%i', role).split(' ');
+    const checked = run(binaries.daemon, [...args, '--check-config', '--data', place]);
+    assert.equal(checked.status, 0, checked.text);
+  }
+  rmSync(place, { recursive: true });
 });
 
 test('the programs are hardened', {
