@@ -23,6 +23,7 @@ enum {
   PROBE_MS = 1000, /* between two checks whether S3 is back */
   READ_TRIES = 3,  /* of an object that arrived with wrong bytes */
   BLOCK = 1 << 18,
+  UPLOAD = 1200, /* bytes of the id of an upload in parts, encoded */
 };
 static const char owner_name[] = "orbmorph-owner";
 
@@ -268,9 +269,55 @@ store_result bucket_claim(object_bucket *b, const char *owner) {
   return result;
 }
 
+/* The id of an upload in parts that S3 has begun, encoded for a query. */
+static store_result read_upload(const s3_answer *answer, char encoded[UPLOAD]) {
+  const char *at = answer->text;
+  char id[UPLOAD / 3];
+  if (at && s3_element(&at, "UploadId", id, sizeof id) && s3_encode(id, encoded, UPLOAD)) {
+    return STORE_OK;
+  }
+  log_error("S3 answered the begin of an upload in parts without an UploadId");
+  return STORE_ERROR;
+}
+
+/* If this fails too, a lifecycle rule of the bucket removes the parts. */
+static void abort_parts(object_bucket *b, const char *name, const char *upload) {
+  char query[UPLOAD + 16];
+  s3_answer answer;
+  snprintf(query, sizeof query, "uploadId=%s", upload);
+  const s3_request request = {.method = "DELETE", .key = name, .query = query, .to = -1, .tries = 1};
+  s3_send(b->store, &request, &answer);
+  free(answer.text);
+}
+
+store_result bucket_check_writes(object_bucket *b) {
+  const s3_place *p = &b->options.place;
+  char upload[UPLOAD];
+  s3_answer answer;
+  const s3_request begin = {.method = "POST", .key = owner_name, .query = "uploads=", .to = -1, .tries = TRIES};
+  s3_send(b->store, &begin, &answer);
+  store_result result = meaning(&answer);
+  if (result == STORE_OK) {
+    result = read_upload(&answer, upload);
+  } else if (result == STORE_AWAY) {
+    log_error("S3 at %s does not answer: %s", p->host, answer.why);
+  } else {
+    log_error(
+        "S3 at %s refuses to write to the bucket %s: %s. Check what the keys may do (PutObject, DeleteObject, "
+        "AbortMultipartUpload)",
+        p->host, p->bucket, answer.why);
+    result = STORE_UNFIT;
+  }
+  free(answer.text);
+  if (result == STORE_OK) {
+    abort_parts(b, owner_name, upload);
+  }
+  return result;
+}
+
 static store_result put_part(object_bucket *b, const char *name, const char *upload, int fd, int number, uint64_t at,
                              uint64_t size, api_text *list) {
-  char sha[65], query[1400];
+  char sha[65], query[UPLOAD + 64];
   s3_answer answer = {0};
   snprintf(query, sizeof query, "partNumber=%d&uploadId=%s", number, upload);
   const s3_request request = {.method = "PUT",
@@ -341,16 +388,11 @@ static store_result complete(object_bucket *b, const char *name, const char *que
 }
 
 static store_result put_parts(object_bucket *b, const char *name, int fd, uint64_t size, const char *sha) {
-  char upload[400] = "", encoded[1200], query[1400];
+  char upload[UPLOAD], query[UPLOAD + 16];
   s3_answer answer;
   const s3_request begin = {.method = "POST", .key = name, .query = "uploads=", .meta = sha, .to = -1, .tries = TRIES};
   store_result result = ask(b, &begin, &answer);
-  const char *at = answer.text;
-  if (result == STORE_OK &&
-      (!at || !s3_element(&at, "UploadId", upload, sizeof upload) || !s3_encode(upload, encoded, sizeof encoded))) {
-    log_error("S3 answered the begin of an upload in parts without an UploadId");
-    result = STORE_ERROR;
-  }
+  result = result == STORE_OK ? read_upload(&answer, upload) : result;
   free(answer.text);
   if (result != STORE_OK) {
     return result;
@@ -360,16 +402,15 @@ static store_result put_parts(object_bucket *b, const char *name, int fd, uint64
   api_text_add(&list, "<CompleteMultipartUpload xmlns=\"http://s3.amazonaws.com/doc/2006-03-01/\">");
   for (uint64_t done = 0; result == STORE_OK && done < size; done += b->part) {
     uint64_t left = size - done;
-    result = put_part(b, name, encoded, fd, ++number, done, left < b->part ? left : b->part, &list);
+    result = put_part(b, name, upload, fd, ++number, done, left < b->part ? left : b->part, &list);
   }
   api_text_add(&list, "</CompleteMultipartUpload>");
-  snprintf(query, sizeof query, "uploadId=%s", encoded);
+  snprintf(query, sizeof query, "uploadId=%s", upload);
   result = result == STORE_OK && list.failed ? STORE_ERROR : result;
   result = result == STORE_OK ? complete(b, name, query, list.data, sha) : result;
   api_text_free(&list);
-  if (result != STORE_OK) { /* if this fails too, a lifecycle rule of the bucket removes the parts */
-    const s3_request abort = {.method = "DELETE", .key = name, .query = query, .to = -1, .tries = 1};
-    ask_only(b, &abort);
+  if (result != STORE_OK && !bucket_is_away(b)) {
+    abort_parts(b, name, upload);
   }
   return result;
 }

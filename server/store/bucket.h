@@ -24,6 +24,9 @@ typedef struct bucket_options {
  * wrong; STORE_AWAY: no answer. Both are logged. */
 store_result bucket_open(const bucket_options *options, char owner[BUCKET_OWNER + 1], object_bucket **out);
 void bucket_close(object_bucket *b);
+/* Whether the keys may write: begins an upload in parts and aborts it, which writes nothing. STORE_UNFIT: they may not;
+ * logged. */
+store_result bucket_check_writes(object_bucket *b);
 /* Makes the prefix belong to `owner`. STORE_UNFIT: another deployment has claimed it; logged. */
 store_result bucket_claim(object_bucket *b, const char *owner);
 

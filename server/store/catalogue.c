@@ -339,6 +339,14 @@ store_result catalogue_open(const char *where, catalogue **out) {
   return catalogue_open_shared(where, 0, out);
 }
 
+store_result catalogue_opened(int code, int is_url) {
+  const int refused = code == SQL_READONLY || code == SQL_NOTADB;
+  return code == SQL_OK                                                        ? STORE_OK
+         : code == SQL_FULL                                                    ? STORE_FULL
+         : code == SQL_UNFINISHED || code == SQL_SCHEMA || (is_url && refused) ? STORE_UNFIT
+                                                                               : STORE_ERROR;
+}
+
 store_result catalogue_open_shared(const char *where, int shared, catalogue **out) {
   catalogue *cat = calloc(1, sizeof *cat);
   if (!cat) {
@@ -361,10 +369,7 @@ store_result catalogue_open_shared(const char *where, int shared, catalogue **ou
     log_error("the catalogue %s cannot be opened: %s", cat->path, sql_reason(code));
   }
   catalogue_close(cat);
-  int refused = code == SQL_READONLY || code == SQL_NOTADB;
-  return code == SQL_FULL                                                                      ? STORE_FULL
-         : code == SQL_UNFINISHED || code == SQL_SCHEMA || (database_is_url(where) && refused) ? STORE_UNFIT
-                                                                                               : STORE_ERROR;
+  return catalogue_opened(code, database_is_url(where));
 }
 
 void catalogue_close(catalogue *cat) {

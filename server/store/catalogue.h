@@ -141,6 +141,9 @@ int64_t catalogue_bytes(catalogue *cat, int derived_only); /* −1: cannot be re
 /* Random bytes of this data folder, fixed when its catalogue is created. */
 enum { CATALOGUE_SECRET = 16 };
 store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET]);
+/* The same before a catalogue in PostgreSQL is opened, so that nothing is written and no schema migrated.
+ * STORE_NOT_FOUND: the database has no catalogue yet. Other errors are logged, with the results of catalogue_open(). */
+store_result catalogue_peek(const char *url, unsigned char out[CATALOGUE_SECRET]);
 
 /* A row of a job. request and problem are allocated with malloc(). */
 typedef struct job_row {

@@ -11,6 +11,7 @@
 #include "log.h"
 #include "store/move_mark.h"
 #include "store/move_rows.h"
+#include "store/rows.h"
 
 struct move {
   store_place from, to;
@@ -50,17 +51,14 @@ static int is_whole(database *db) {
 }
 
 static store_result mark_of(database *db, char out[PLACE_MARK]) {
-  sql_statement *st = database_statement(db, "SELECT bytes FROM secret");
-  int size = 0;
-  const void *bytes = st && sql_step(st) == SQL_ROW ? sql_bytes(st, 0, &size) : NULL;
-  int fine = bytes && size == CATALOGUE_SECRET;
-  if (fine) {
-    place_hash(bytes, out);
-  } else {
+  unsigned char secret[CATALOGUE_SECRET];
+  if (resource_secret(db, secret) != SQL_OK) {
     log_error("migrate: the catalogue has no secret: it is damaged");
+    return STORE_ERROR;
   }
-  sql_reset(st);
-  return fine ? STORE_OK : STORE_ERROR;
+  place_hash(secret, out);
+  sodium_memzero(secret, sizeof secret);
+  return STORE_OK;
 }
 
 /* Whether the options name what the source's data folder says. */
@@ -205,7 +203,7 @@ static store_result match_bucket(move *m) {
   if (result == STORE_OK && *m->owner && strcmp(m->owner, unfinished) != 0 && strcmp(m->owner, m->mark) != 0) {
     return refuse("the bucket of the target belongs to another deployment");
   }
-  return result;
+  return result == STORE_OK ? bucket_check_writes(m->want.bucket) : result;
 }
 
 /* Only a move that was killed during its last steps leaves both the final owner and the mark. */

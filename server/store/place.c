@@ -182,14 +182,37 @@ static store_result match_bucket(const store_place *p, const char *here, const c
   return STORE_OK;
 }
 
+static store_result refuse_bucket(void) {
+  log_error("the bucket of --objects belongs to another catalogue: name another bucket or prefix, or its catalogue");
+  return STORE_UNFIT;
+}
+
+/* A node whose catalogue is not the one that owns the bucket must not create or migrate it. */
+static store_result match_catalogue(const char *url, const char *owner) {
+  unsigned char secret[CATALOGUE_SECRET];
+  char mark[MARK];
+  store_result result = catalogue_peek(url, secret);
+  if (result == STORE_NOT_FOUND) {
+    log_error(
+        "the bucket of --objects belongs to another deployment: the database of --catalogue has no catalogue, or not "
+        "where this user looks for it. Name another bucket or prefix, or the catalogue of that deployment");
+    return STORE_UNFIT;
+  }
+  if (result != STORE_OK) {
+    return result;
+  }
+  place_hash(secret, mark);
+  sodium_memzero(secret, sizeof secret);
+  return strcmp(owner, mark) == 0 ? STORE_OK : refuse_bucket();
+}
+
 /* Ties the three together, once all are known. */
 static store_result claim(const store_place *p, const char *path, const char *here, const char *owner, object_bucket *b,
                           catalogue *cat) {
   char mark[MARK];
   store_result result = mark_of(cat, mark);
   if (result == STORE_OK && *owner && strcmp(owner, mark) != 0) {
-    log_error("the bucket of --objects belongs to another catalogue: name another bucket or prefix, or its catalogue");
-    return STORE_UNFIT;
+    return refuse_bucket();
   }
   if (result == STORE_OK && !*owner) {
     result = bucket_claim(b, mark);
@@ -206,6 +229,8 @@ static store_result open_bucket(const store_place *p, const char *path, const ch
     return result;
   }
   result = match_bucket(p, here, owner);
+  result = result == STORE_OK ? bucket_check_writes(b) : result;
+  result = result == STORE_OK && *owner && p->catalogue ? match_catalogue(p->catalogue, owner) : result;
   result = result == STORE_OK ? catalogue_open_among(p->data, p->catalogue, p->catalogue != NULL, cat) : result;
   result = result == STORE_OK ? claim(p, path, here, owner, b, *cat) : result;
   if (result != STORE_OK) {

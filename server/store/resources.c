@@ -266,21 +266,39 @@ int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   return rows_integer(cat, db, st);
 }
 
+int resource_secret(database *db, unsigned char out[CATALOGUE_SECRET]) {
+  sql_statement *st = database_statement(db, "SELECT bytes FROM secret");
+  int size = 0, code = st ? sql_step(st) : SQL_ERROR;
+  const void *bytes = code == SQL_ROW ? sql_bytes(st, 0, &size) : NULL;
+  if (bytes && size == CATALOGUE_SECRET) {
+    memcpy(out, bytes, CATALOGUE_SECRET);
+  }
+  sql_reset(st);
+  return code != SQL_ROW && code != SQL_DONE ? code : size == CATALOGUE_SECRET ? SQL_OK : SQL_ERROR;
+}
+
 store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET]) {
   database *db = catalogue_reader(cat);
-  store_result result = STORE_ERROR;
-  sql_statement *st = database_statement(db, "SELECT bytes FROM secret");
-  if (st) {
-    int size = 0;
-    const void *bytes = sql_step(st) == SQL_ROW ? sql_bytes(st, 0, &size) : NULL;
-    if (bytes && size == CATALOGUE_SECRET) {
-      memcpy(out, bytes, CATALOGUE_SECRET);
-      result = STORE_OK;
-    }
-    sql_reset(st);
-  }
+  int code = resource_secret(db, out);
   catalogue_reader_done(cat, db);
-  return result;
+  return code == SQL_OK ? STORE_OK : STORE_ERROR;
+}
+
+store_result catalogue_peek(const char *url, unsigned char out[CATALOGUE_SECRET]) {
+  database db;
+  int version = 0, code = database_open(url, SQL_READS, &db);
+  if (code != SQL_OK) {
+    return catalogue_opened(code, 1);
+  }
+  code = db.connection.driver->version(&db.connection, &version);
+  if (code == SQL_OK && version > 0) {
+    code = resource_secret(&db, out);
+  }
+  if (code != SQL_OK) {
+    log_error("the catalogue in PostgreSQL cannot be read: %s", db.connection.driver->message(&db.connection));
+  }
+  database_close(&db);
+  return code == SQL_OK && version == 0 ? STORE_NOT_FOUND : catalogue_opened(code, 1);
 }
 
 /* describes: whether a row's description is valid JSON with the row's own id. */

@@ -16,6 +16,9 @@ int resource_insert(database *db, const resource *r, int *fresh);
 int resource_remove(database *db, resource_kind kind, const char *id);      /* SQL_NOTFOUND: no such row */
 int job_insert(database *db, job_row *row, const struct job_webhook *hook); /* sets row->seq; hook NULL: none */
 
+/* The secret of a catalogue; SQL_ERROR also if it is damaged. */
+int resource_secret(database *db, unsigned char out[CATALOGUE_SECRET]);
+
 /* read fills one row and returns 0 if out of memory; release frees a row, also one that was filled in part (NULL: a row
  * owns no memory). */
 typedef struct row_kind {

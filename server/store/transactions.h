@@ -28,6 +28,9 @@ void catalogue_write_gathered(struct catalogue *cat, write_fn fn, void *arg);
 void catalogue_write_joined(struct catalogue *cat, write_fn fn, void *arg, int (*join)(void *waiting, void *arg),
                             void (*release)(void *arg));
 
+/* What the code of an attempt to open a database means to callers of catalogue_open(). */
+store_result catalogue_opened(int code, int is_url);
+
 const char *catalogue_path(const struct catalogue *cat);
 
 database *catalogue_reader(struct catalogue *cat); /* waits until one is free */

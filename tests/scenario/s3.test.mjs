@@ -11,7 +11,7 @@ import { list, s3 } from '../tools/s3.mjs';
 import { runProgram } from './support/cli.mjs';
 import { assertProblem, Daemon, daemon, root, samples, until } from './support/daemon.mjs';
 import { workers } from './support/processes.mjs';
-import { busy, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
+import { busy, denied, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
 import { bean, egg, obj, tetrahedron } from './support/shapes.mjs';
 
 const server = process.env.ORB_S3;
@@ -95,6 +95,26 @@ test('a missing bucket, wrong keys and a bucket of others are refused, and nothi
   assert.equal((await files.upload(tetrahedron)).status, 201);
   await files.stop();
   refused(start(files.data, ['--objects', at('objects/new')]), /are files: start without --objects/);
+});
+
+test('keys that may read but not write are refused, and nothing is written', async (t) => {
+  const data = await folder(t);
+  const reads = ({ method }) => (['GET', 'HEAD'].includes(method) ? undefined : denied);
+  const proxy = await s3Proxy(t, server, reads);
+  const objects = (prefix) => ['--objects', `s3://objects/${prefix}?endpoint=${proxy.url}`];
+  const run = (...args) => runProgram(program, ['--listen', '127.0.0.1:0', ...args, '--log-format', 'text']);
+  const first = await run('--data', data, ...objects('unwritten'));
+  assert.equal(first.code, 78, first.err);
+  assert.match(first.err, /refuses to write to the bucket objects: it answered 403 AccessDenied/);
+  assert.deepEqual(await list(server, 'objects', 'unwritten'), []);
+  assert.ok(!existsSync(path.join(data, 'catalogue.sqlite')));
+  // Also where the bucket is this deployment's already, and its keys have been replaced.
+  const { d } = await stored(t, 'replaced');
+  await d.stop();
+  const later = await run('--data', d.data, ...objects('replaced'));
+  assert.equal(later.code, 78, later.err);
+  proxy.decide = () => undefined;
+  assert.equal(await (await s3(server, 'GET', 'objects?uploads=')).text().then((text) => /<Upload>/.test(text)), false);
 });
 
 test('what was stored is served after the cache was emptied, whole and in ranges', async (t) => {

@@ -5,6 +5,8 @@ import http from 'node:http';
 export const pass = 'pass';
 /** 503 SlowDown, without asking the server. */
 export const busy = 'busy';
+/** 403 AccessDenied, without asking the server. */
+export const denied = 'denied';
 /** The server carries out the request, and its answer is lost. */
 export const lost = 'lost';
 /** The same, and its answer is 500. */
@@ -47,10 +49,11 @@ export async function s3Proxy(t, url, decide) {
     const how = (await proxy.decide(asked)) ?? pass;
     proxy.seen.push({ ...asked, how });
     if (response.destroyed) return; // the client has gone while the request was held
-    if (how === busy) {
+    if (how === busy || how === denied) {
+      const [status, code] = how === busy ? [503, 'SlowDown'] : [403, 'AccessDenied'];
       request.resume();
       request.on('end', () =>
-        response.writeHead(503, { 'content-type': 'application/xml' }).end('<Error><Code>SlowDown</Code></Error>'),
+        response.writeHead(status, { 'content-type': 'application/xml' }).end(`<Error><Code>${code}</Code></Error>`),
       );
       return;
     }
