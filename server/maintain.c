@@ -11,6 +11,7 @@
 #include "store/owners.h"
 #include "store/place.h"
 #include "store/several.h"
+#include "store/shared.h"
 #include "store/spheres.h"
 #include "store/verify.h"
 
@@ -156,6 +157,10 @@ static int open_both(const config *options, tally *t) {
   const store_place place = store_place_of(options);
   store_result result = stores_open(&place, &t->store, &t->cat);
   t->unfit = result == STORE_UNFIT;
+  if (result == STORE_OK && !catalogue_maintain(t->cat)) {
+    puts("another --gc or --check-data works on this catalogue: run this one when it has ended");
+    return 0;
+  }
   return result == STORE_OK;
 }
 

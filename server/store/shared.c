@@ -423,6 +423,18 @@ store_result catalogue_shared_of(catalogue *cat, const char *owner, int64_t *run
   return result;
 }
 
+int catalogue_maintain(catalogue *cat) {
+  if (!catalogue_is_shared(cat)) {
+    return 1;
+  }
+  database *db = catalogue_reader(cat);
+  sql_statement *st = database_statement(db, "SELECT pg_try_advisory_lock(?1::int, hashtext(current_schema()))::int");
+  if (st) {
+    sql_bind_integer(st, 1, SQL_LOCK_MAINTAIN);
+  }
+  return rows_integer(cat, db, st) != 0; /* if the database cannot be asked, the caller's next question fails as well */
+}
+
 int catalogue_needs_mesh(catalogue *cat, const char *mesh, const char *owner) {
   database *db = catalogue_reader(cat);
   sql_statement *st = database_statement(db,

@@ -89,6 +89,9 @@ typedef struct shared_numbers {
 store_result catalogue_shared_numbers(catalogue *cat, shared_numbers *out);
 /* An owner's running and other unfinished jobs. */
 store_result catalogue_shared_of(catalogue *cat, const char *owner, int64_t *running, int64_t *queued);
+/* For --gc and --check-data: 0: another process does either on this catalogue. Else none can until this catalogue is
+ * closed. Also for a catalogue that is not shared. */
+int catalogue_maintain(catalogue *cat);
 /* Whether an unfinished job (of this owner, unless NULL) names a mesh. */
 int catalogue_needs_mesh(catalogue *cat, const char *mesh, const char *owner);
 /* The problem of the newest job with this key and owner that ended after a time, if it failed; malloc(), or NULL. */

@@ -53,8 +53,8 @@ typedef struct sql_statement {
 /* What a connection may do: read; write, and create the database if there is none; write beside other nodes. */
 enum { SQL_READS, SQL_WRITES, SQL_SHARES };
 /* Advisory locks of PostgreSQL. The first is of the connection that writes, the next of migrations, then of
- * transactions of nodes, of housekeeping, and of publishing and deleting objects. */
-enum { SQL_LOCK = 0x6f726d, SQL_LOCK_WRITES = SQL_LOCK + 2, SQL_LOCK_HOUSE, SQL_LOCK_OBJECTS };
+ * transactions of nodes, of housekeeping, of publishing and deleting objects, and of --gc and --check-data. */
+enum { SQL_LOCK = 0x6f726d, SQL_LOCK_WRITES = SQL_LOCK + 2, SQL_LOCK_HOUSE, SQL_LOCK_OBJECTS, SQL_LOCK_MAINTAIN };
 
 typedef struct sql_driver {
   /* writer: one of the above. The caller closes the connection, also if it could not be opened. */

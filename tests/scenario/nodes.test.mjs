@@ -4,10 +4,12 @@
 //
 // ORB_ROUNDS (20) is the number of rounds of chaos, ORB_SEED (1) draws what happens in them.
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawnSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
+import { existsSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
+import { folder, runProgram } from './support/cli.mjs';
 import { Cluster, LEASE } from './support/cluster.mjs';
 import { Collector } from './support/collector.mjs';
 import { assertProblem, daemon, endless, samples, until } from './support/daemon.mjs';
@@ -189,6 +191,62 @@ test('a node of a newer version does not start beside older ones', async (t) => 
   assert.equal(c.sql('SELECT schema FROM catalogue'), older);
   assert.equal((await a.upload(newMesh())).status, 201);
   c.sql('UPDATE catalogue SET schema=schema+1');
+});
+
+test('a node with another catalogue than the owner of its bucket is refused, and nothing is written', async (t) => {
+  const c = new Cluster(t);
+  await (await c.node()).upload(newMesh());
+  const other = new Cluster(t);
+  const tables = () => other.sql('SELECT count(*) FROM information_schema.tables WHERE table_schema=current_schema()');
+  const refused = async (why) => {
+    const data = await folder(t);
+    const args = ['--listen', '127.0.0.1:0', '--data', data, '--catalogue', other.catalogue, '--objects', c.bucket];
+    const { status, stderr, stdout } = spawnSync(process.env.ORB_DAEMON, args, { encoding: 'utf8', timeout: 60_000 });
+    assert.equal(status, 78, stderr);
+    assert.match(stderr, why);
+    assert.equal(stdout, '');
+    for (const name of ['catalogue.postgresql', 'objects.s3', 'catalogue.sqlite'])
+      assert.ok(!existsSync(path.join(data, name)), name);
+  };
+  await refused(/belongs to another deployment: the database of --catalogue has no catalogue/);
+  assert.equal(tables(), '0');
+  // A catalogue of its own, of an older version: it is not migrated.
+  await (await other.node('--role', 'serve')).stop();
+  const older = other.sql('UPDATE catalogue SET schema=schema-1 RETURNING schema');
+  await refused(/belongs to another catalogue/);
+  assert.equal(other.sql('SELECT schema FROM catalogue'), older);
+  assert.match(await c.check(), /^1 rows and 1 objects checked: 0 wrong, 0 objects without a row/);
+});
+
+test('one --gc or --check-data works on a catalogue at a time', async (t) => {
+  const c = new Cluster(t);
+  const proxy = await s3Proxy(t, process.env.ORB_S3, () => pass);
+  await (await c.node('--role', 'serve')).upload(newMesh());
+  let release;
+  let came;
+  const held = new Promise((resolve) => (release = resolve));
+  t.after(() => release(pass));
+  const works = new Promise((resolve) => (came = resolve));
+  proxy.decide = ({ method, path: at }) => {
+    if (method !== 'GET' || !/mesh/.test(at)) return pass;
+    came();
+    return held;
+  };
+  const run = async (command, endpoint) => {
+    const objects = c.bucket.replace(process.env.ORB_S3, endpoint);
+    const args = [command, '--data', await folder(t), '--catalogue', c.catalogue, '--objects', objects];
+    return runProgram(process.env.ORB_DAEMON, args);
+  };
+  const first = run('--check-data', proxy.url);
+  await works;
+  for (const command of ['--gc', '--check-data']) {
+    const { code, out } = await run(command, process.env.ORB_S3);
+    assert.equal(code, 1, out);
+    assert.match(out, /another --gc or --check-data works on this catalogue/);
+  }
+  release(pass);
+  assert.match((await first).out, /^1 rows and 1 objects checked: 0 wrong/);
+  assert.equal((await run('--gc', process.env.ORB_S3)).code, 0);
 });
 
 /** Clients of haproxy do not miss a node that is killed. */
