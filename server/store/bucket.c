@@ -180,8 +180,7 @@ static store_result read_options(const bucket_options *options, object_bucket *b
   return STORE_OK;
 }
 
-/* Reads the owner, and logs why the bucket cannot be used. */
-static store_result read_owner(object_bucket *b, char owner[BUCKET_OWNER + 1]) {
+store_result bucket_owner(object_bucket *b, char owner[BUCKET_OWNER + 1]) {
   s3_answer answer;
   const s3_place *p = &b->options.place;
   const s3_request request = {.method = "GET", .key = owner_name, .to = -1, .tries = TRIES};
@@ -214,7 +213,7 @@ store_result bucket_open(const bucket_options *options, char owner[BUCKET_OWNER 
     pthread_mutex_init(&b->lock, NULL);
     wake_init(&b->wake);
     b->store = s3_open(&b->options);
-    result = b->store ? read_owner(b, owner) : STORE_ERROR;
+    result = b->store ? bucket_owner(b, owner) : STORE_ERROR;
     b->watches = result == STORE_OK && pthread_create(&b->watcher, NULL, watch, b) == 0;
     if (!b->watches) {
       bucket_close(b);
@@ -259,7 +258,7 @@ store_result bucket_claim(object_bucket *b, const char *owner) {
   char there[BUCKET_OWNER + 1];
   store_result result = put_text(b, owner_name, owner);
   if (result == STORE_OK) {
-    result = read_owner(b, there);
+    result = bucket_owner(b, there);
   }
   if (result == STORE_OK && strcmp(there, owner) != 0) {
     log_error("another deployment has just taken the bucket %s: name another bucket or prefix with --objects",

@@ -24,6 +24,7 @@ typedef struct bucket_options {
  * wrong; STORE_AWAY: no answer. Both are logged. */
 store_result bucket_open(const bucket_options *options, char owner[BUCKET_OWNER + 1], object_bucket **out);
 void bucket_close(object_bucket *b);
+store_result bucket_owner(object_bucket *b, char owner[BUCKET_OWNER + 1]); /* reads it again; results as above */
 /* Whether the keys may write: begins an upload in parts and aborts it, which writes nothing. STORE_UNFIT: they may not;
  * logged. */
 store_result bucket_check_writes(object_bucket *b);

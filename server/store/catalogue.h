@@ -141,9 +141,13 @@ int64_t catalogue_bytes(catalogue *cat, int derived_only); /* −1: cannot be re
 /* Random bytes of this data folder, fixed when its catalogue is created. */
 enum { CATALOGUE_SECRET = 16 };
 store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET]);
-/* The same before a catalogue in PostgreSQL is opened, so that nothing is written and no schema migrated.
- * STORE_NOT_FOUND: the database has no catalogue yet. Other errors are logged, with the results of catalogue_open(). */
-store_result catalogue_peek(const char *url, unsigned char out[CATALOGUE_SECRET]);
+/* What is known of a catalogue in PostgreSQL before it is opened, which writes: it migrates the schema. */
+typedef struct catalogue_glance {
+  unsigned char secret[CATALOGUE_SECRET];
+  int names_objects; /* it has rows that do */
+} catalogue_glance;
+/* STORE_NOT_FOUND: the database has no catalogue yet. Other errors are logged, with the results of catalogue_open(). */
+store_result catalogue_peek(const char *url, catalogue_glance *out);
 
 /* A row of a job. request and problem are allocated with malloc(). */
 typedef struct job_row {

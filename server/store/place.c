@@ -187,23 +187,32 @@ static store_result refuse_bucket(void) {
   return STORE_UNFIT;
 }
 
-/* A node whose catalogue is not the one that owns the bucket must not create or migrate it. */
-static store_result match_catalogue(const char *url, const char *owner) {
-  unsigned char secret[CATALOGUE_SECRET];
+/* Checks the same for a catalogue in PostgreSQL, which may be new or another than the owner of the bucket: then the
+ * node must not create or migrate it. owner: another node may have claimed the bucket meanwhile. */
+static store_result match_catalogue(const char *url, object_bucket *b, char owner[BUCKET_OWNER + 1]) {
+  catalogue_glance seen = {.names_objects = 0};
   char mark[MARK];
-  store_result result = catalogue_peek(url, secret);
-  if (result == STORE_NOT_FOUND) {
+  store_result result = catalogue_peek(url, &seen);
+  if (result == STORE_NOT_FOUND && *owner) {
     log_error(
         "the bucket of --objects belongs to another deployment: the database of --catalogue has no catalogue, or not "
         "where this user looks for it. Name another bucket or prefix, or the catalogue of that deployment");
     return STORE_UNFIT;
   }
-  if (result != STORE_OK) {
-    return result;
+  place_hash(seen.secret, mark);
+  sodium_memzero(&seen.secret, sizeof seen.secret);
+  if (result == STORE_OK && !*owner && seen.names_objects) {
+    result = bucket_owner(b, owner);
+    if (result == STORE_OK && !*owner) {
+      log_error(
+          "the bucket of --objects has none of the objects of this catalogue: name the bucket and prefix that "
+          "they are in");
+      return STORE_UNFIT;
+    }
   }
-  place_hash(secret, mark);
-  sodium_memzero(secret, sizeof secret);
-  return strcmp(owner, mark) == 0 ? STORE_OK : refuse_bucket();
+  return result == STORE_OK && *owner && strcmp(owner, mark) != 0 ? refuse_bucket()
+         : result == STORE_NOT_FOUND                              ? STORE_OK
+                                                                  : result;
 }
 
 /* Ties the three together, once all are known. */
@@ -230,7 +239,7 @@ static store_result open_bucket(const store_place *p, const char *path, const ch
   }
   result = match_bucket(p, here, owner);
   result = result == STORE_OK ? bucket_check_writes(b) : result;
-  result = result == STORE_OK && *owner && p->catalogue ? match_catalogue(p->catalogue, owner) : result;
+  result = result == STORE_OK && p->catalogue ? match_catalogue(p->catalogue, b, owner) : result;
   result = result == STORE_OK ? catalogue_open_among(p->data, p->catalogue, p->catalogue != NULL, cat) : result;
   result = result == STORE_OK ? claim(p, path, here, owner, b, *cat) : result;
   if (result != STORE_OK) {

@@ -284,7 +284,19 @@ store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET
   return code == SQL_OK ? STORE_OK : STORE_ERROR;
 }
 
-store_result catalogue_peek(const char *url, unsigned char out[CATALOGUE_SECRET]) {
+static int glance(database *db, catalogue_glance *out) {
+  int code = resource_secret(db, out->secret);
+  sql_statement *st =
+      code == SQL_OK ? database_statement(db, "SELECT 1 FROM resource WHERE kind!=3 LIMIT 1") : NULL; /* 3: landmarks */
+  if (st) {
+    code = sql_step(st);
+    out->names_objects = code == SQL_ROW;
+    sql_reset(st);
+  }
+  return code == SQL_ROW || code == SQL_DONE ? SQL_OK : code == SQL_OK ? SQL_ERROR : code;
+}
+
+store_result catalogue_peek(const char *url, catalogue_glance *out) {
   database db;
   int version = 0, code = database_open(url, SQL_READS, &db);
   if (code != SQL_OK) {
@@ -292,7 +304,7 @@ store_result catalogue_peek(const char *url, unsigned char out[CATALOGUE_SECRET]
   }
   code = db.connection.driver->version(&db.connection, &version);
   if (code == SQL_OK && version > 0) {
-    code = resource_secret(&db, out);
+    code = glance(&db, out);
   }
   if (code != SQL_OK) {
     log_error("the catalogue in PostgreSQL cannot be read: %s", db.connection.driver->message(&db.connection));

@@ -9,6 +9,7 @@ import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
+import { list } from '../tools/s3.mjs';
 import { folder, runProgram } from './support/cli.mjs';
 import { Cluster, LEASE } from './support/cluster.mjs';
 import { Collector } from './support/collector.mjs';
@@ -198,9 +199,9 @@ test('a node with another catalogue than the owner of its bucket is refused, and
   await (await c.node()).upload(newMesh());
   const other = new Cluster(t);
   const tables = () => other.sql('SELECT count(*) FROM information_schema.tables WHERE table_schema=current_schema()');
-  const refused = async (why) => {
+  const refused = async (why, catalogue = other.catalogue, bucket = c.bucket) => {
     const data = await folder(t);
-    const args = ['--listen', '127.0.0.1:0', '--data', data, '--catalogue', other.catalogue, '--objects', c.bucket];
+    const args = ['--listen', '127.0.0.1:0', '--data', data, '--catalogue', catalogue, '--objects', bucket];
     const { status, stderr, stdout } = spawnSync(process.env.ORB_DAEMON, args, { encoding: 'utf8', timeout: 60_000 });
     assert.equal(status, 78, stderr);
     assert.match(stderr, why);
@@ -215,6 +216,9 @@ test('a node with another catalogue than the owner of its bucket is refused, and
   const older = other.sql('UPDATE catalogue SET schema=schema-1 RETURNING schema');
   await refused(/belongs to another catalogue/);
   assert.equal(other.sql('SELECT schema FROM catalogue'), older);
+  // A wrong prefix: objects would be in two places.
+  await refused(/has none of the objects of this catalogue/, c.catalogue, c.bucket.replace('?', 'x?'));
+  assert.deepEqual(await list(process.env.ORB_S3, 'objects', `${/objects\/(.*)\?/.exec(c.bucket)[1]}x/`), []);
   assert.match(await c.check(), /^1 rows and 1 objects checked: 0 wrong, 0 objects without a row/);
 });
 
