@@ -65,7 +65,6 @@ void intake_close(intake_file *file) {
     munmap(file->bytes, (size_t)file->size);
   }
   file->bytes = NULL;
-  objects_abandon(file->temp);
 }
 
 /* Checks the mesh in these bytes. */

@@ -22,7 +22,7 @@ typedef struct intake_file {
 /* Maps or reads a complete temporary file and computes the id of its mesh. hash: of its bytes. 0: no memory. The file
  * keeps pointers to temp and upload. */
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload);
-void intake_close(intake_file *file); /* also deletes the temporary file if it is left */
+void intake_close(intake_file *file); /* leaves the temporary file */
 
 /* Limits on a check; the context has the same. */
 typedef struct intake_limits {

@@ -4,8 +4,10 @@
 #include <stdlib.h>
 
 #include "orbmorph/context.h"
+#include "wake.h"
 
-enum { TURNS = 256 }; /* owners whose hashes agree modulo this share their turns */
+enum { TURNS = 256 };   /* owners whose hashes agree modulo this share their turns */
+enum { LOOK_MS = 500 }; /* how soon a task that waits for memory ends once it is no longer wanted */
 
 struct tasks {
   pthread_mutex_t lock;
@@ -16,6 +18,8 @@ struct tasks {
     int running, unfinished;
   } turns[TURNS];
   memory_budget *memory; /* may be NULL */
+  budget_claim claim;    /* of the oldest task that waits for other parts of the budget */
+  int lacking;           /* a task waits for memory */
   int stopping, count;
   pthread_t threads[];
 };
@@ -37,25 +41,48 @@ static void enter(tasks *pool, const task *t) {
   mine->unfinished++;
 }
 
-static int has_room(tasks *pool, const task *t) {
-  return !pool->memory || t->memory == 0 || budget_has_room(pool->memory, t->part, t->memory);
+static budget_room room_for(tasks *pool, task *t) {
+  if (!pool->memory || t->memory == 0) {
+    return BUDGET_FREE;
+  }
+  const budget_room room = budget_look(pool->memory, t->part, t->memory, &pool->claim);
+  if (room == BUDGET_FREE || !t->is_wanted || t->is_wanted(t)) {
+    return room;
+  }
+  t->memory = 0;
+  return BUDGET_FREE;
+}
+
+/* A thread is free: claims the memory of this task. NULL: none waits. */
+static void claim_memory(tasks *pool, const task *t) {
+  if (pool->memory && (t || pool->claim.bytes > 0)) {
+    pool->claim.part = t ? t->part : pool->claim.part;
+    budget_claim_bytes(pool->memory, &pool->claim, t ? t->memory : 0);
+  }
 }
 
 /* Takes the next task out of the list, with its memory; NULL: there is none, or none has memory now. O(waiting tasks).
  */
 static task *choose(tasks *pool) {
   task **best = NULL;
+  const task *waiting = NULL; /* the oldest for which others hold the memory */
+  pool->lacking = 0;
   for (task **at = &pool->first; *at; at = &(*at)->next) {
+    const budget_room room = room_for(pool, *at);
     const struct turn *a = turn_of(pool, *at), *b = best ? turn_of(pool, *best) : NULL;
-    if ((!b || a->running < b->running || (a->running == b->running && a->used_ms < b->used_ms)) &&
-        has_room(pool, *at)) {
+    if (room != BUDGET_FREE) {
+      pool->lacking = 1;
+      waiting = !waiting && room == BUDGET_OTHERS && (*at)->part != BUDGET_SMALL ? *at : waiting;
+    } else if (!b || a->running < b->running || (a->running == b->running && a->used_ms < b->used_ms)) {
       best = at;
     }
   }
   task *t = best ? *best : NULL;
-  if (t && pool->memory && t->memory > 0 && !budget_take(pool->memory, t->part, t->memory)) {
+  if (t && pool->memory && t->memory > 0 &&
+      budget_take(pool->memory, t->part, t->memory, &pool->claim) != BUDGET_FREE) {
     t = NULL; /* others took it just now, and wake this pool when they end */
   }
+  claim_memory(pool, t ? NULL : waiting);
   if (t) {
     *best = t->next;
     pool->last = t->next ? pool->last : best;
@@ -97,6 +124,10 @@ static void *thread_main(void *argument) {
     if (!t && pool->stopping && !pool->first) {
       break;
     }
+    if (!t && pool->lacking) {
+      wake_wait_ms(&pool->wake, &pool->lock, LOOK_MS);
+      continue;
+    }
     if (!t) {
       pthread_cond_wait(&pool->wake, &pool->lock);
       continue;
@@ -115,7 +146,7 @@ tasks *tasks_start(int threads, memory_budget *memory) {
   pool->last = &pool->first;
   pool->memory = memory;
   pthread_mutex_init(&pool->lock, NULL);
-  pthread_cond_init(&pool->wake, NULL);
+  wake_init(&pool->wake);
   if (memory) {
     budget_listen(memory, memory_freed, pool);
   }

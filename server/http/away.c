@@ -21,7 +21,8 @@ static void run_away(task *t) {
   if (r->next_pool) {
     tasks *pool = r->next_pool;
     r->next_pool = NULL;
-    t->memory = 0; /* that was for a check */
+    t->memory = r->next_memory;
+    t->part = BUDGET_CHECKS;
     tasks_add(pool, t);
     return;
   }
@@ -32,15 +33,21 @@ static void run_away(task *t) {
   MHD_resume_connection(r->connection);
 }
 
-void request_go_on(request *r, tasks *pool, void (*fn)(request *r)) {
+static int task_is_wanted(task *t) {
+  return request_is_wanted(t);
+}
+
+void request_go_on(request *r, tasks *pool, int64_t memory, void (*fn)(request *r)) {
   r->away = fn;
   r->next_pool = pool;
+  r->next_memory = memory;
   r->phase = PHASE_AWAY;
 }
 
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {
   r->away = fn;
   r->away_task.run = run_away;
+  r->away_task.is_wanted = task_is_wanted;
   const char *tenant = access_tenant(r);
   r->away_task.owner = tenant[0] ? keyed_hash(tenant, strlen(tenant)) : 0;
   r->phase = PHASE_AWAY;

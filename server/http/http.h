@@ -102,6 +102,7 @@ struct request {
   task away_task; /* first: a task is the request */
   void (*away)(request *r);
   tasks *next_pool; /* the task that takes the request after this one; NULL: none */
+  int64_t next_memory;
   server *srv;
   struct MHD_Connection *connection;
   watched *watched; /* the connection; may be NULL */
@@ -164,8 +165,9 @@ void http_stop(server *srv);
  * REQUEST_AWAY, which the handler returns in turn: the task owns the request now, and the handler must not touch it. */
 #define REQUEST_AWAY ((enum MHD_Result)2)
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r));
-/* Within a task, without a response: the request goes on in another pool as soon as this task has returned. */
-void request_go_on(request *r, tasks *pool, void (*fn)(request *r));
+/* Within a task, without a response: the request goes on in a pool as soon as this task has returned. memory: bytes of
+ * BUDGET_CHECKS that it needs then. */
+void request_go_on(request *r, tasks *pool, int64_t memory, void (*fn)(request *r));
 /* Within a task: another thread owns the request from now on, and adds the task again or resumes the connection. */
 void request_handed_over(void);
 

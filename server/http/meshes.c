@@ -144,24 +144,18 @@ static int store_within(request *r, const intake_file *file, int64_t memory, int
   return 1;
 }
 
-/* Checks the file with the memory of the task. If it needs more, waits for all that so many bytes can need. */
-static void store_mesh(request *r, const intake_file *file) {
-  memory_budget *memory = r->srv->memory;
+static void upload_away(request *r);
+
+/* Checks the file with the memory of the task. 0: it needs more, and the request goes on once there is all that so many
+ * bytes can need. */
+static int store_mesh(request *r, const intake_file *file) {
   const int fills = (file->upload->options.repair & ORB_REPAIR_FILL_HOLES) != 0;
-  const int64_t first = r->away_task.memory;
-  const int64_t most = budget_for_densest_file(memory, BUDGET_CHECKS, r->received, fills);
-  const int64_t kept = r->away_task.part == BUDGET_CHECKS ? first : 0; /* the pool gives this back */
-  if (store_within(r, file, first, first >= most)) {
-    return;
+  const int64_t most = budget_for_densest_file(r->srv->memory, BUDGET_CHECKS, r->received, fills);
+  const int done = store_within(r, file, r->away_task.memory, r->away_task.memory >= most);
+  if (!done) {
+    request_go_on(r, r->srv->large_checks, most, upload_away);
   }
-  if (kept) {
-    budget_give(memory, BUDGET_CHECKS, kept, NULL);
-  }
-  budget_wait(memory, BUDGET_CHECKS, most);
-  store_within(r, file, most, 1);
-  if (most > kept) {
-    budget_give(memory, BUDGET_CHECKS, most - kept, NULL);
-  }
+  return done;
 }
 
 static void upload_away(request *r) {
@@ -169,8 +163,13 @@ static void upload_away(request *r) {
   api_problem problem = {0};
   intake_file file;
   store_result result;
+  int done = 1;
   if (!read_upload(r, &query, &problem)) {
     reply_problem(r, &problem);
+    return;
+  }
+  if (r->away_task.memory == 0) {
+    reply_refuse(r, "unavailable", "The server is stopping, or the connection of this request ended; try again soon.");
     return;
   }
   if (!intake_open(&file, &r->temp, &r->hash, r->received, &query)) {
@@ -182,9 +181,12 @@ static void upload_away(request *r) {
     intake_restore(&file, r->srv->store);
     reply_cached(r, 200, known);
   } else if (access_has_room(r, r->received, &problem)) {
-    store_mesh(r, &file);
+    done = store_mesh(r, &file);
   } else {
     reply_problem(r, &problem);
+  }
+  if (done) {
+    objects_abandon(&r->temp);
   }
   intake_close(&file);
 }

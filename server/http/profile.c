@@ -114,6 +114,8 @@ static store_result add_profile(request *r, const char *sha, int64_t bytes) {
   return stored;
 }
 
+static void profile_away(request *r);
+
 static store_result store_profile(request *r, object_temp *temp, int64_t *bytes) {
   server *srv = r->srv;
   char sha[API_ID_SIZE];
@@ -136,10 +138,11 @@ static store_result store_profile(request *r, object_temp *temp, int64_t *bytes)
   return stored;
 }
 
-/* 1, or 0 with a response. */
+/* Makes it within the memory of the task. 1, or 0 with a response, or the request goes on with all the memory that a
+ * profile may have. */
 static int make(request *r, flight *mine) {
   const config *options = r->srv->options;
-  const int64_t memory = budget_most(r->srv->memory, BUDGET_CHECKS) / 2;
+  const int64_t memory = r->away_task.memory, most = budget_for_profile(r->srv->memory, INT64_MAX);
   orb_context_options limits = {
       .memory_limit = (size_t)memory, .threads = 1, .deadline_ms = orb_clock_ms() + 1000 * options->job_seconds};
   making what = {r, mine};
@@ -156,9 +159,7 @@ static int make(request *r, flight *mine) {
     reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
     return 0;
   }
-  budget_wait(r->srv->memory, BUDGET_CHECKS, memory);
   int fine = convert(r, ctx, &work, &out, &problem);
-  budget_give(r->srv->memory, BUDGET_CHECKS, memory, NULL);
   store_result stored = fine ? store_profile(r, &out, &bytes) : STORE_OK;
   int64_t took = orb_clock_ms() - began;
   if (r->signer) {
@@ -174,6 +175,9 @@ static int make(request *r, flight *mine) {
     __atomic_add_fetch(&r->srv->profiles_made, 1, __ATOMIC_RELAXED);
   } else if (fine) {
     reply_store(r, stored);
+  } else if (memory < most && strcmp(problem.name, "no-memory") == 0) {
+    api_problem_free(&problem);
+    request_go_on(r, r->srv->large_checks, most, profile_away);
   } else {
     reply_problem(r, &problem);
   }
@@ -217,33 +221,51 @@ static void land(request *r, flight *mine) {
   }
 }
 
-/* Sends the profile if it is stored. 1 with a response, also if there is no supermesh; 0: it has to be made. */
-static int send_if_stored(request *r) {
+/* Sends the profile if it is stored. 1 with a response, also if there is no supermesh; 0: it has to be made. *bytes: of
+ * the supermesh; may be NULL. */
+static int send_if_stored(request *r, int64_t *bytes) {
   store_result result;
   const cached *entry = read_again(r, &result);
   if (!entry) {
     reply_store(r, result);
     return 1;
   }
+  if (bytes) {
+    *bytes = entry->row.bytes;
+  }
   r->phase = PHASE_AWAY; /* also after a first answer that the object is lost */
   return reply_stored_asset(r, entry) && r->status != 404;
+}
+
+/* The task has no memory yet, or waited for it until nobody wanted the profile. */
+static void wait_for_memory(request *r, int64_t bytes) {
+  if (request_is_wanted(r)) {
+    request_go_on(r, r->srv->large_checks, budget_for_profile(r->srv->memory, bytes), profile_away);
+  } else {
+    reply_refuse(r, "unavailable", "The server is stopping, or the connection of this request ended; try again soon.");
+  }
 }
 
 /* Makes the profile of the supermesh r->id unless it exists, and sends it. Blocks. */
 static void profile_away(request *r) {
   flight mine;
-  if (!send_if_stored(r)) {
+  int64_t bytes = 0;
+  if (!send_if_stored(r, &bytes)) {
+    if (r->away_task.memory == 0) {
+      wait_for_memory(r, bytes);
+      return;
+    }
     if (!take_flight(r, &mine)) {
       return;
     }
-    if (!send_if_stored(r) && make(r, &mine) && !send_if_stored(r)) {
+    if (!send_if_stored(r, NULL) && make(r, &mine) && !send_if_stored(r, NULL)) {
       reply_lost(r);
     }
     land(r, &mine);
   }
   if (r->status == 404 && r->make_again) { /* the asset was damaged, and its row is gone */
     reply_drop(r);
-    request_go_on(r, r->srv->io, r->make_again);
+    request_go_on(r, r->srv->io, 0, r->make_again);
   }
 }
 
@@ -255,7 +277,7 @@ int reply_asset(request *r, const cached *entry) {
   }
   if (in_task) { /* not made, or lost */
     r->status = 0;
-    request_go_on(r, r->srv->large_checks, profile_away);
+    request_go_on(r, r->srv->large_checks, 0, profile_away);
   }
   return in_task;
 }

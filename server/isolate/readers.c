@@ -137,7 +137,7 @@ static reader *start(reader *r, const char *tenant, budget_part part, orb_contex
   r->part = part;
   r->shortages = budget_shortages(own.memory, part);
   r->tenant = strdup(tenant);
-  if (r->tenant && budget_take(own.memory, part, r->memory)) {
+  if (r->tenant && budget_take(own.memory, part, r->memory, NULL) == BUDGET_FREE) {
     if (isolate_open(&r->process, ctx)) {
       return r;
     }

@@ -72,6 +72,7 @@ struct queue {
   int isolated;                                    /* jobs have processes of their own */
   int guests;                                      /* of those that run */
   int stopping, stopping_now, waking;
+  budget_claim claim;     /* of a job that a worker waits for */
   struct sharing *shared; /* with other nodes; NULL: this process alone runs the jobs */
   struct {
     char name[64];
@@ -133,6 +134,8 @@ void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now);
 /* The threads of a job that was entered: its part of the cores. beside: the jobs that could run now as well. */
 int schedule_threads(const queue *q, const job *j, int64_t beside);
 int schedule_take_memory(queue *q, queue_lane lane, job *j);
+/* No worker waits for the memory that is claimed. */
+void schedule_drop_claim(queue *q);
 /* The most triangles of a job for which the lane has memory, −1: none; *big: also for one that needs all. */
 int64_t schedule_room(const queue *q, queue_lane lane, int *big);
 void table_add(queue *q, job *j);

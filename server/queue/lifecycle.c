@@ -33,6 +33,7 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   pthread_cond_init(&q->fetch_work, NULL);
   pthread_cond_init(&q->committed, NULL);
   wake_init(&q->timer_wake);
+  q->claim.part = BUDGET_JOBS;
   if (options->memory) {
     budget_listen(options->memory, memory_freed, q);
   }

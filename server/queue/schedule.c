@@ -50,8 +50,13 @@ static int64_t memory_of(const queue *q, queue_lane lane, const job *j) {
   return j->needs_all || j->row.cost > (most - base) / BYTES_A_TRIANGLE ? most : base + BYTES_A_TRIANGLE * j->row.cost;
 }
 
+static budget_room look_for_memory(const queue *q, queue_lane lane, const job *j) {
+  return q->options.memory ? budget_look(q->options.memory, part_of(lane), memory_of(q, lane, j), &q->claim)
+                           : BUDGET_FREE;
+}
+
 static int has_memory(const queue *q, queue_lane lane, const job *j) {
-  return !q->options.memory || budget_has_room(q->options.memory, part_of(lane), memory_of(q, lane, j));
+  return look_for_memory(q, lane, j) == BUDGET_FREE;
 }
 
 /* Whether a worker of this lane may take a runnable job that computes. kept: the workers are kept for a suspect. */
@@ -69,6 +74,29 @@ static int admits(const queue *q, queue_lane lane, const job *j, int kept) {
     return 1;
   }
   return q->owners[j->owner].running == 0 && (computing >= workers || !fits || kept);
+}
+
+void schedule_drop_claim(queue *q) {
+  if (q->claim.bytes > 0) {
+    budget_claim_bytes(q->options.memory, &q->claim, 0);
+    budget_tell(q->options.memory, q);
+  }
+}
+
+/* A worker is free: claims the memory of the oldest job that waits for checks alone. */
+static void claim_memory(queue *q, int64_t now) {
+  int64_t bytes = 0;
+  for (const job *j = q->first; j && bytes == 0 && q->options.memory; j = j->next) {
+    if (runnable(q, j, now) && !fetches(j) && look_for_memory(q, QUEUE_COMPUTES, j) == BUDGET_OTHERS) {
+      bytes = memory_of(q, QUEUE_COMPUTES, j);
+    }
+  }
+  if (bytes < q->claim.bytes) {
+    schedule_drop_claim(q);
+  }
+  if (bytes > 0) {
+    budget_claim_bytes(q->options.memory, &q->claim, bytes);
+  }
 }
 
 job *schedule_choose(queue *q, queue_lane lane) {
@@ -102,6 +130,9 @@ job *schedule_choose(queue *q, queue_lane lane) {
       best = j;
     }
   }
+  if (!best && lane == QUEUE_COMPUTES) {
+    claim_memory(q, now);
+  }
   return best;
 }
 
@@ -121,11 +152,14 @@ static void count(queue *q, const job *j, int by) {
   }
 }
 
-/* 0: others took it just now, and wake the queue when they end. */
+/* 0: there is none now; others wake the queue when they end. */
 int schedule_take_memory(queue *q, queue_lane lane, job *j) {
-  int64_t bytes = memory_of(q, lane, j);
-  int taken = bytes == 0 || budget_take(q->options.memory, part_of(lane), bytes);
+  const int64_t bytes = memory_of(q, lane, j);
+  const int taken = bytes == 0 || budget_take(q->options.memory, part_of(lane), bytes, &q->claim) == BUDGET_FREE;
   j->memory = taken ? bytes : 0;
+  if (taken && lane == QUEUE_COMPUTES) { /* the next worker that waits claims again */
+    schedule_drop_claim(q);
+  }
   return taken;
 }
 

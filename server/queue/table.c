@@ -52,6 +52,10 @@ void table_drop_key(queue *q, job *j) {
   q->unfinished--;
   q->unfinished_fetches -= fetches(j);
   owner_leave(q, j);
+  if (q->claim.bytes > 0) { /* perhaps for this job */
+    schedule_drop_claim(q);
+    wake_workers(q);
+  }
 }
 
 job *table_with_id(const queue *q, const char *id) {

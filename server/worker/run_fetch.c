@@ -116,11 +116,45 @@ static store_result known(const run_env *env, const job *j, const char *id) {
   return found;
 }
 
+/* Checks and stores the mesh within so many bytes of memory. */
+static store_result check_within(download *d, const job *j, const api_fetch_request *wish, const intake_file *file,
+                                 int64_t memory, api_problem *problem) {
+  intake_stored kept = {0};
+  if (!budget_wait(d->options->memory, BUDGET_CHECKS, memory, continues, d)) {
+    return STORE_OK; /* cancelled: the context has the error */
+  }
+  while (sem_wait(d->options->checks) != 0) { /* interrupted by a signal */
+  }
+  const intake_limits limits = {.memory = memory,
+                                .deadline_ms = orb_clock_ms() + d->options->check_ms,
+                                .max_triangles = d->options->max_triangles,
+                                .part = BUDGET_CHECKS};
+  store_result stored =
+      intake_store(file, d->env->cat, d->env->store, d->ctx, &limits, job_owner(j), wish->quota, &kept, problem);
+  resource_free(&kept.row);
+  sem_post(d->options->checks);
+  budget_give(d->options->memory, BUDGET_CHECKS, memory, NULL);
+  return stored;
+}
+
+/* If the file needs more memory than ordinary ones of its size, it is checked again with what the densest need. */
+static store_result check(download *d, const job *j, const api_fetch_request *wish, const intake_file *file,
+                          api_problem *problem) {
+  const int fills = (wish->upload.options.repair & ORB_REPAIR_FILL_HOLES) != 0;
+  const int64_t first = budget_for_file(d->options->memory, BUDGET_CHECKS, d->size);
+  const int64_t most = budget_for_densest_file(d->options->memory, BUDGET_CHECKS, d->size, fills);
+  store_result stored = check_within(d, j, wish, file, first, problem);
+  if (first < most && problem->name && strcmp(problem->name, "no-memory") == 0) {
+    api_problem_free(problem);
+    stored = check_within(d, j, wish, file, most, problem);
+  }
+  return stored;
+}
+
 static int store(download *d, const job *j, const api_fetch_request *wish, char mesh[API_ID_SIZE],
                  api_problem *problem) {
   const run_env *env = d->env;
   intake_file file;
-  intake_stored kept = {0};
   progress_report(env->progress, "check", 0);
   if (!intake_open(&file, &d->temp, &d->hash, d->size, &wish->upload)) {
     return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
@@ -130,19 +164,7 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
   if (stored == STORE_OK) {
     intake_restore(&file, env->store);
   } else if (stored == STORE_NOT_FOUND) {
-    while (sem_wait(d->options->checks) != 0) { /* interrupted by a signal */
-    }
-    const int fills = (wish->upload.options.repair & ORB_REPAIR_FILL_HOLES) != 0;
-    const int64_t memory = budget_for_densest_file(d->options->memory, BUDGET_CHECKS, d->size, fills);
-    budget_wait(d->options->memory, BUDGET_CHECKS, memory);
-    const intake_limits limits = {.memory = memory,
-                                  .deadline_ms = orb_clock_ms() + d->options->check_ms,
-                                  .max_triangles = d->options->max_triangles,
-                                  .part = BUDGET_CHECKS};
-    stored = intake_store(&file, env->cat, env->store, d->ctx, &limits, job_owner(j), wish->quota, &kept, problem);
-    resource_free(&kept.row);
-    budget_give(d->options->memory, BUDGET_CHECKS, memory, NULL);
-    sem_post(d->options->checks);
+    stored = check(d, j, wish, &file, problem);
   }
   intake_close(&file);
   if (stored == STORE_CONFLICT) {

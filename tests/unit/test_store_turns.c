@@ -296,7 +296,7 @@ static void test_tasks_share_memory(void **state) {
   tasks_free(pools[1]);
   assert_true(most <= 100);
   assert_true(most > 60); /* two at once, where they fit */
-  assert_true(budget_has_room(memory, BUDGET_CHECKS, 100));
+  assert_int_equal(budget_look(memory, BUDGET_CHECKS, 100, NULL), BUDGET_FREE);
 
   budget_destroy(memory);
   memory = budget_create(200);
@@ -304,8 +304,8 @@ static void test_tasks_share_memory(void **state) {
 
   /* Beside a task that takes a whole part, another part still has room, and a smaller task passes a larger one. */
   most = 0;
-  assert_true(budget_take(memory, BUDGET_CHECKS, 70));
-  assert_false(budget_take(memory, BUDGET_CHECKS, 31));
+  assert_int_equal(budget_take(memory, BUDGET_CHECKS, 70, NULL), BUDGET_FREE);
+  assert_int_equal(budget_take(memory, BUDGET_CHECKS, 31, NULL), BUDGET_FULL);
   tasks *pool = tasks_start(1, memory);
   int next = 0;
   noted large = {.task = {.run = note, .memory = 31, .part = BUDGET_CHECKS}, .next = &next};
@@ -339,8 +339,9 @@ static void test_memory_of_files(void **state) {
   memory = budget_create(512 << 20);
   assert_non_null(memory);
   const int64_t one = budget_for_file(memory, BUDGET_CHECKS, 13400000);
-  assert_true(budget_take(memory, BUDGET_CHECKS, one) && budget_take(memory, BUDGET_CHECKS, one));
-  assert_false(budget_take(memory, BUDGET_CHECKS, one));
+  assert_int_equal(budget_take(memory, BUDGET_CHECKS, one, NULL), BUDGET_FREE);
+  assert_int_equal(budget_take(memory, BUDGET_CHECKS, one, NULL), BUDGET_FREE);
+  assert_int_equal(budget_take(memory, BUDGET_CHECKS, one, NULL), BUDGET_FULL);
   budget_destroy(memory);
 }
 
@@ -355,17 +356,17 @@ static void test_listeners(void **state) {
   memory_budget *memory = budget_create(200);
   assert_non_null(memory);
   budget_listen(memory, count_call, &calls);
-  assert_true(budget_take(memory, BUDGET_CHECKS, 60));
+  assert_int_equal(budget_take(memory, BUDGET_CHECKS, 60, NULL), BUDGET_FREE);
   const unsigned before = budget_shortages(memory, BUDGET_CHECKS);
   budget_give(memory, BUDGET_CHECKS, 10, NULL);
   assert_int_equal(calls, 0);
-  assert_false(budget_has_room(memory, BUDGET_CHECKS, 60));
+  assert_int_equal(budget_look(memory, BUDGET_CHECKS, 60, NULL), BUDGET_FULL);
   assert_true(budget_shortages(memory, BUDGET_CHECKS) != before);
   budget_give(memory, BUDGET_CHECKS, 10, NULL);
   assert_int_equal(calls, 1);
   budget_give(memory, BUDGET_CHECKS, 10, NULL);
   assert_int_equal(calls, 1);
-  assert_false(budget_take(memory, BUDGET_SMALL, 51));
+  assert_int_equal(budget_take(memory, BUDGET_SMALL, 51, NULL), BUDGET_FULL);
   budget_give(memory, BUDGET_CHECKS, 30, NULL); /* another part */
   assert_int_equal(calls, 1);
   budget_destroy(memory);
