@@ -24,7 +24,8 @@ if ! podman "${own[@]}" image exists docker.io/library/debian:12-slim; then
   tar -C "$at/base" -c . | podman "${own[@]}" import --quiet - docker.io/library/debian:12-slim
 fi
 # Chroots instead of containers for the steps: this also works inside other containers.
-buildah "${own[@]}" bud --layers --isolation=chroot --pull-never --format docker -f deploy/Dockerfile -t orbmorph .
+buildah "${own[@]}" bud --layers --isolation=chroot --pull-never --format docker \
+  --build-arg BASE=docker.io/library/debian:12-slim -f deploy/Dockerfile -t orbmorph .
 
 # Without systemd, which podman would ask for cgroups and timers; limits that need no privilege.
 run=(podman "${own[@]}" --cgroup-manager cgroupfs --events-backend file --runtime runc)

@@ -144,16 +144,27 @@ test('the image is built from a base that is named by its digest', async (t) => 
     `#!/bin/sh\necho "$@" >> ${place}/calls\n[ "$1 $2" = "image inspect" ] && echo docker.io/library/debian@${digest}\nexit 0\n`,
     { mode: 0o755 },
   );
-  const { status, text } = run('env', [`ORB_BUILDER=${builder}`, path.join(root, 'deploy/image.sh'), 'name']);
+  const make = (...variables) =>
+    run('env', [`ORB_BUILDER=${builder}`, ...variables, path.join(root, 'deploy/image.sh'), 'name']);
+  for (const base of ['docker.io/library/debian:12-slim', `debian@${digest.slice(0, -1)}`, `@${digest}`]) {
+    const refused = make(`ORB_BASE=${base}`);
+    assert.equal(refused.status, 1, base);
+    assert.match(refused.text, /has no digest: name one as IMAGE:TAG@sha256:DIGEST/);
+  }
+  assert.throws(() => readFileSync(path.join(place, 'calls')), 'nothing is built');
+  const other = make(`ORB_BASE=example.org/debian:12@${digest}`);
+  assert.match(other.text, new RegExp(`^base: example.org/debian:12@${digest}$`, 'm'));
+  const { status, text } = make();
   assert.equal(status, 0, text);
   const [, reference] = /^base: (\S+)$/m.exec(text);
   assert.match(reference, /^docker\.io\/library\/debian:12-slim@sha256:[0-9a-f]{64}$/);
+  assert.equal(reference, readFileSync(path.join(root, 'deploy/base-image'), 'utf8').trim());
   const build = readFileSync(path.join(place, 'calls'), 'utf8').trim().split('\n').pop();
   assert.ok(build.startsWith(`build --build-arg BASE=${reference} `), build);
   assert.match(build, / -f deploy\/Dockerfile -t name \.$/);
   const file = readFileSync(path.join(root, 'deploy/Dockerfile'), 'utf8');
   assert.equal(file.match(/^FROM /gm).length, 2);
-  assert.match(file, /^FROM \$\{BASE\} AS build$[\s\S]*^FROM \$\{BASE\}$/m);
+  assert.match(file, /^ARG BASE$\n^FROM \$\{BASE\} AS build$[\s\S]*^FROM \$\{BASE\}$/m, 'without a default');
 });
 
 test('the unit denies all addresses; with the drop-in, what the daemon refuses: all but public ones', async () => {
