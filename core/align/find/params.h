@@ -95,6 +95,10 @@ static const double ORB_FIND_DRAWN_BEND = 2;
 /* If the map that such a match leads to has more energy than this, all other starts are tried as well: shrec397 to
  * shrec393 had 3.1 from noisy targets, and 1.4 from other starts. Right maps of people have at most 1.5. */
 static const double ORB_FIND_POSED_POOR = 1.8;
+/* A pose is given up after its first start if the pins have a map of this share of its energy or less. With 1, a pose
+ * of two people that had 1.32 was given up for pins with 1.28, and would have come to 1.13; where shapes of other kinds
+ * were, pins had 0.85 to 0.94. */
+static const double ORB_FIND_POSED_BEATEN = 0.95;
 /* No other starts are tried if the pinned map and that of the match differ by this share of the energy at most: where
  * two ways end alike, a third has not been seen to end better. The same share as for two walks (params.walked.agree).
  */

@@ -104,12 +104,12 @@ static orb_status try_pins(contest *c) {
   return ORB_OK;
 }
 
-/* Is a pose whose first map has this energy worth more work? Only if the pins have no better map. */
+/* Is a pose whose first map has this energy worth more work? Not if the pins have a clearly better one. */
 static orb_status ask_pins(void *user, double energy, int *goes_on) {
   contest *c = user;
   ORB_TRY(try_pins(c));
   const double poor = orb_map_params_of(c->options->preset).energy.poor;
-  *goes_on = !c->walked || c->pinned.energy > poor || c->pinned.energy > energy;
+  *goes_on = !c->walked || c->pinned.energy > poor || c->pinned.energy > ORB_FIND_POSED_BEATEN * energy;
   return ORB_OK;
 }
 

@@ -49,7 +49,7 @@ typedef struct unfolding {
   orb_context *ctx;
   orb_map_level *l;
   int32_t *triangle, *twin, *corner; /* half-edge 3t + k leaves triangle[3t + k]; corner: one that leaves a vertex */
-  unsigned char *gone;               /* of each triangle */
+  unsigned char *flipped;            /* of each triangle, while vertices collapse; those that are gone are not */
   int32_t *queue, queue_count;       /* vertices to look at */
   unsigned char *queued;
   collapse *done;
@@ -110,12 +110,18 @@ static int fan_flips(const unfolding *u, const int32_t *star, int count, int k, 
   return flips;
 }
 
-static int star_flips(const unfolding *u, int32_t v, const int32_t *star, int count) {
+static int star_flips(const unfolding *u, const int32_t *star, int count) {
   int flips = 0;
   for (int i = 0; i < count; i++) {
-    flips += is_flipped(u, v, end_of(u, star[i]), end_of(u, star[(i + 1) % count]));
+    flips += u->flipped[star[i] / 3];
   }
   return flips;
+}
+
+/* Notes whether a triangle is flipped. */
+static void look_at(unfolding *u, int32_t t) {
+  const int32_t *v = u->triangle + 3 * (size_t)t;
+  u->flipped[t] = (unsigned char)is_flipped(u, v[0], v[1], v[2]);
 }
 
 static void ask(unfolding *u, int32_t v) {
@@ -144,12 +150,13 @@ static void apply(unfolding *u, int32_t v, const int32_t *star, int count, int k
   int32_t a1 = end_of(u, star[(k + 1) % count]), an = end_of(u, last);
   for (int i = 1; i + 1 < count; i++) {
     u->triangle[star[(k + i) % count]] = onto;
+    look_at(u, star[(k + i) % count] / 3);
   }
   int32_t right_out = u->twin[orb_next(first)], right_in = u->twin[orb_prev(first)];
   int32_t left_out = u->twin[orb_next(last)], left_in = u->twin[last];
   join(u, right_out, right_in);
   join(u, left_out, left_in);
-  u->gone[first / 3] = u->gone[last / 3] = 1;
+  u->flipped[first / 3] = u->flipped[last / 3] = 0;
   u->corner[onto] = right_in;
   u->corner[a1] = right_out;
   u->corner[an] = left_in;
@@ -167,7 +174,6 @@ static void split(unfolding *u, const collapse *c) {
   join(u, u->twin[orb_prev(first)], orb_prev(first));
   join(u, u->twin[orb_next(last)], orb_next(last));
   join(u, u->twin[last], last);
-  u->gone[first / 3] = u->gone[last / 3] = 0;
   u->corner[c->vertex] = first;
   u->corner[ring[0]] = orb_next(first);
   u->corner[ring[1]] = orb_prev(first);
@@ -181,7 +187,7 @@ static int try_vertex(unfolding *u, int32_t v, enum allowed allowed) {
     return 0;
   }
   int count = star_of(u, v, star), best = -1, least_flips = 0;
-  int before = star_flips(u, v, star, count);
+  int before = star_flips(u, star, count);
   double fattest = -INFINITY;
   if (count < 3 || (before == 0 && allowed != THIN) || u->ring_count + count > u->ring_capacity) {
     return 0;
@@ -235,8 +241,7 @@ static int try_triangle(unfolding *u, int32_t t, enum allowed allowed) {
 static int collapse_some(unfolding *u, enum allowed allowed) {
   int any = 0;
   for (int32_t t = 0; t < u->l->triangle_count && u->flips > 0; t++) {
-    const int32_t *v = u->triangle + 3 * (size_t)t;
-    if (!u->gone[t] && is_flipped(u, v[0], v[1], v[2]) && try_triangle(u, t, allowed)) {
+    if (u->flipped[t] && try_triangle(u, t, allowed)) {
       any = 1;
       run_queue(u);
     }
@@ -360,14 +365,14 @@ static orb_status build(unfolding *u) {
   u->triangle = ORB_NEW(u->ctx, int32_t, h);
   u->twin = ORB_NEW(u->ctx, int32_t, h);
   u->corner = ORB_NEW(u->ctx, int32_t, n);
-  u->gone = ORB_NEW0(u->ctx, unsigned char, l->triangle_count);
+  u->flipped = ORB_NEW(u->ctx, unsigned char, l->triangle_count);
   u->queue = ORB_NEW(u->ctx, int32_t, n);
   u->queued = ORB_NEW0(u->ctx, unsigned char, n);
   u->done = ORB_NEW(u->ctx, collapse, n);
   u->ring_capacity = 16 * l->count;
   u->ring = ORB_NEW(u->ctx, int32_t, u->ring_capacity);
   u->spoke = ORB_NEW(u->ctx, int32_t, u->ring_capacity);
-  if (!u->triangle || !u->twin || !u->corner || !u->gone || !u->queue || !u->queued || !u->done || !u->ring ||
+  if (!u->triangle || !u->twin || !u->corner || !u->flipped || !u->queue || !u->queued || !u->done || !u->ring ||
       !u->spoke) {
     return ORB_E_NO_MEMORY;
   }
@@ -376,6 +381,9 @@ static orb_status build(unfolding *u) {
   for (size_t i = 0; i < h; i++) {
     u->corner[u->triangle[i]] = (int32_t)i;
   }
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    look_at(u, t);
+  }
   return ORB_OK;
 }
 
@@ -383,7 +391,7 @@ static void unfolding_free(unfolding *u) {
   orb_free(u->ctx, u->triangle);
   orb_free(u->ctx, u->twin);
   orb_free(u->ctx, u->corner);
-  orb_free(u->ctx, u->gone);
+  orb_free(u->ctx, u->flipped);
   orb_free(u->ctx, u->queue);
   orb_free(u->ctx, u->queued);
   orb_free(u->ctx, u->done);
@@ -394,9 +402,8 @@ static void unfolding_free(unfolding *u) {
 /* Collapses what is flipped. */
 static void collapse_flips(unfolding *u) {
   for (int32_t t = 0; t < u->l->triangle_count; t++) {
-    const int32_t *v = u->triangle + 3 * (size_t)t;
-    for (int k = 0; k < 3 && is_flipped(u, v[0], v[1], v[2]); k++) {
-      ask(u, v[k]);
+    for (int k = 0; k < 3 && u->flipped[t]; k++) {
+      ask(u, u->triangle[3 * (size_t)t + (size_t)k]);
     }
   }
   collapse_all(u);
