@@ -114,7 +114,7 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
     }
     c->work = c->work > work ? c->work : work;
     orb_status status = orb_map_walked_create(c, i < most ? p->walked.guides[i] : p->walked.few[i - most], &w);
-    agree = w.energy < INFINITY && fabs(w.energy - best->energy) <= p->walked.agree * w.energy;
+    agree = w.energy < INFINITY && fabs(w.energy - best->energy) <= p->walked.agree * (w.energy - 1);
     if (status == ORB_OK && w.energy < best->energy) {
       orb_map_walked worse = *best;
       *best = w;

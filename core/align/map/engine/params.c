@@ -56,7 +56,7 @@ static const orb_map_params DEFAULTS = {
                .few = {6, 4},
                .enough = 1.4,
                .beat_most = 2,
-               .agree = 0.03},
+               .agree = 0.1},
     .sweep = {.still = 1e-3, .still_share = 500, .over = 1.5},
     .step = {.tries = 8, .shrink = 0.2, .shorten = 0.4, .sufficient = 1e-4, .convexity = 0.05, .least_slope = 1e-12},
     .star = {.epsilon = 0.1, .flat = 1e-4, .hinge = 0.1, .upright = 0.3, .mollify = 1e-3},
