@@ -2,7 +2,7 @@
  *
  *     bench-profile FILE.glb [OUT]
  *
- * Prints a line of JSON for each profile: bytes, milliseconds of processor time and bounds. With OUT also writes
+ * Prints a line of JSON for each profile: bytes, milliseconds of processor time, bytes of memory and bounds. With OUT also writes
  * OUT.PROFILE.glb. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,9 +22,10 @@ static int measure(const unsigned char *asset, size_t size, orb_profile profile,
   }
   if (fine) {
     printf(
-        "{\"profile\":\"%s\",\"bytes\":%zu,\"float_bytes\":%zu,\"cpu_ms\":%.3f,\"position_relative\":%.9g,"
-        "\"normal_degrees\":%.9g}\n",
-        orb_profile_name(profile), bytes.size, size, 1e3 * seconds, facts.position_relative, facts.normal_degrees);
+        "{\"profile\":\"%s\",\"bytes\":%zu,\"float_bytes\":%zu,\"cpu_ms\":%.3f,\"peak_bytes\":%zu,"
+        "\"position_relative\":%.9g,\"normal_degrees\":%.9g}\n",
+        orb_profile_name(profile), bytes.size, size, 1e3 * seconds, orb_memory_peak(ctx), facts.position_relative,
+        facts.normal_degrees);
   }
   if (fine && out) {
     char path[4096];
