@@ -24,8 +24,10 @@
 enum { SMALL = 48 }; /* edges; least area takes O(edges³) time and the tables below O(SMALL²) memory */
 
 /* Most triangles of fair surfaces: for each edge of their rim (a disc needs about 11 at the patch's growth, a rim with
- * short edges more), and in all, which takes about three seconds to solve. */
-enum { FAIR_AN_EDGE = 24, FAIR_LEAST = 4, FAIR_MOST = 131072 };
+ * short edges more); in all as many as the mesh has, so that the fill costs no more than a multiple of its faces, but
+ * FAIR_SOME (0.15 s) for a small mesh and FAIR_MOST (1.2 s) for a large one. Where the rims want more than that, each
+ * edge gets fewer; with less than FAIR_LEAST the loops are flat. */
+enum { FAIR_AN_EDGE = 24, FAIR_LEAST = 4, FAIR_SOME = 16384, FAIR_MOST = 131072 };
 /* How often a patch is refined and made fair: the fair surface is larger than the flat one, and its shape depends a
  * little on the triangles that it starts from. */
 enum { FAIR_ROUNDS = 3 };
@@ -36,7 +38,7 @@ typedef struct fill {
   int32_t *vertex; /* their origins */
   int32_t *cut;    /* its triangulation: 3 indices into loop for each triangle */
   int64_t later;   /* room that the loops after this one need: triangles if flat, at least as many as vertices */
-  int32_t fair;    /* triangles that fair surfaces may still have */
+  double an_edge;  /* triangles that a fair surface may have for each edge of its rim */
   orb_polygon polygon;
   double best[SMALL][SMALL];
   int split[SMALL][SMALL];
@@ -186,16 +188,14 @@ static orb_status add_patch(fill *f, const orb_patch *patch) {
     }
     add_face(f, vertex, like);
   }
-  f->fair -= patch->triangle_count;
   return ORB_OK;
 }
 
 static orb_status close_fairly(fill *f, int32_t count) {
   orb_patch patch = {0};
-  const int64_t wanted = FAIR_AN_EDGE * (int64_t)count;
   cut_loop(f, count);
   orb_status status = orb_patch_open(f->s->ctx, f->s->mesh->positions, f->vertex, count, f->cut,
-                                     wanted < f->fair ? (int32_t)wanted : f->fair, &patch);
+                                     (int32_t)(f->an_edge * count), FAIR_AN_EDGE / f->an_edge, &patch);
   for (int round = 0; round < FAIR_ROUNDS && status == ORB_OK; round++) {
     status = orb_patch_refine(f->s->ctx, &patch);
     if (status == ORB_OK) {
@@ -227,6 +227,21 @@ static int32_t collect_loop(fill *f, int32_t h, unsigned char *seen) {
   return count;
 }
 
+/* Shares the triangles of fair surfaces out to the edges of all long loops. */
+static void share_out(fill *f, unsigned char *seen, int32_t half_edges) {
+  const int32_t faces = f->s->mesh->triangle_count;
+  const int32_t all = faces < FAIR_SOME ? FAIR_SOME : faces < FAIR_MOST ? faces : FAIR_MOST;
+  int64_t edges = 0;
+  for (int32_t h = 0; h < half_edges; h++) {
+    if (f->s->twin[h] == ORB_OPEN && !seen[h]) {
+      const int32_t count = collect_loop(f, h, seen);
+      edges += count > SMALL ? count : 0;
+    }
+  }
+  memset(seen, 0, (size_t)(uint32_t)half_edges);
+  f->an_edge = edges * FAIR_AN_EDGE > all ? (double)all / (double)edges : FAIR_AN_EDGE;
+}
+
 /* fans: whether loops that are closed flat get fans. *loops: their number, counted anew. */
 static orb_status close_all(fill *f, orb_fill how, int fans, int64_t *loops) {
   orb_surface *s = f->s;
@@ -234,9 +249,11 @@ static orb_status close_all(fill *f, orb_fill how, int fans, int64_t *loops) {
   ORB_TRY(orb_mesh_reserve(s->ctx, s->mesh, (int32_t)*loops, (int32_t)s->edges.open));
   *loops = 0;
   f->later = s->edges.open;
-  f->fair = FAIR_MOST;
   unsigned char *seen = ORB_NEW0(s->ctx, unsigned char, half_edges);
   orb_status status = seen ? ORB_OK : ORB_E_NO_MEMORY;
+  if (seen && how == ORB_FILL_FAIR) {
+    share_out(f, seen, half_edges);
+  }
   for (int32_t h = 0; h < half_edges && status == ORB_OK; h++) {
     if (s->twin[h] != ORB_OPEN || seen[h]) {
       continue;
@@ -244,7 +261,7 @@ static orb_status close_all(fill *f, orb_fill how, int fans, int64_t *loops) {
     int32_t count = collect_loop(f, h, seen);
     ORB_ASSERT(count >= 3);
     f->later -= count;
-    if (how == ORB_FILL_FAIR && count > SMALL && FAIR_LEAST * (int64_t)count <= f->fair) {
+    if (how == ORB_FILL_FAIR && count > SMALL && f->an_edge >= FAIR_LEAST) {
       status = close_fairly(f, count);
     } else if (fans) {
       close_with_fan(f, count);

@@ -11,7 +11,8 @@ typedef enum orb_fill {
 } orb_fill;
 
 /* Closes each boundary loop with triangles. *loops: how many. O(F), and O(48²) for each edge of a short loop. Fair
- * surfaces have at most 131,072 triangles together; loops beyond that are flat. */
+ * surfaces have at most as many triangles together as the surface, but 16,384 are always allowed and 131,072 never
+ * exceeded; where the loops are too long for that, they are coarser, or flat. */
 ORB_MUST_CHECK orb_status orb_surface_fill(orb_surface *surface, orb_fill how, int64_t *loops);
 
 #endif

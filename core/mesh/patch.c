@@ -77,8 +77,8 @@ static void place_rim(orb_patch *p, const double *positions, const int32_t *loop
 }
 
 orb_status orb_patch_open(orb_context *ctx, const double *positions, const int32_t *loop, int32_t count,
-                          const int32_t *cut, int32_t most, orb_patch *p) {
-  *p = (orb_patch){.rim = count, .vertex_count = count, .triangle_count = count - 2};
+                          const int32_t *cut, int32_t most, double coarser, orb_patch *p) {
+  *p = (orb_patch){.rim = count, .vertex_count = count, .triangle_count = count - 2, .growth = coarser * GROWTH};
   p->triangle_room = (most > count ? most : count) + 2 * count; /* a diagonal for each two triangles, at most */
   p->vertex_room = count + p->triangle_room / 2;
   p->positions = ORB_NEW(ctx, double, 3 * (size_t)p->vertex_room);
@@ -128,7 +128,7 @@ static void split(orb_patch *p, int32_t h) {
   for (int k = 0; k < 3; k++) {
     p->positions[3 * m + k] = 0.5 * (at(p, a)[k] + at(p, b)[k]);
   }
-  p->size[m] = fmin(p->size[a], p->size[b]) + GROWTH * 0.5 * length;
+  p->size[m] = fmin(p->size[a], p->size[b]) + p->growth * 0.5 * length;
   p->like[m] = p->like[p->size[a] <= p->size[b] ? a : b];
   set_triangle(p, s, a, m, c);
   set_triangle(p, u, m, b, c);
@@ -202,7 +202,7 @@ static void flip_all(orb_patch *p) {
 static void grade(orb_patch *p) {
   for (int32_t h = 0; h < 3 * p->triangle_count; h++) {
     const int32_t a = p->triangles[h], b = p->triangles[orb_next(h)];
-    const double growth = GROWTH * edge_length(p, h);
+    const double growth = p->growth * edge_length(p, h);
     p->size[a] = fmin(p->size[a], p->size[b] + growth);
     p->size[b] = fmin(p->size[b], p->size[a] + growth);
   }
