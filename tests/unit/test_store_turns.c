@@ -372,6 +372,46 @@ static void test_listeners(void **state) {
   budget_destroy(memory);
 }
 
+/* What a worker finds; it does not wait. */
+static job *look(queue *q) {
+  pthread_mutex_lock(&q->lock);
+  job *j = schedule_choose(q, QUEUE_COMPUTES);
+  pthread_mutex_unlock(&q->lock);
+  return j;
+}
+
+/* A job that needs all memory of jobs waits for a check. Later large checks leave it room, until it has its memory or
+ * is cancelled; small ones do not wait. */
+static void test_a_job_claims_memory(void **state) {
+  stored *s = *state;
+  const int64_t all = INT64_C(4) << 30, beside = 64 << 20;
+  for (int is_cancelled = 0; is_cancelled < 2; is_cancelled++) {
+    memory_budget *memory = budget_create(all);
+    assert_non_null(memory);
+    const queue_options options = {.workers = 2, .cores = 2, .limit = 1000, .memory = memory};
+    queue *q = queue_create(&options, s->cat);
+    assert_non_null(q);
+    assert_int_equal(budget_take(memory, BUDGET_CHECKS, all / 4, NULL), BUDGET_FREE);
+    submit(s, q, "large", all);
+    job *waiting = q->last;
+    assert_null(look(q));
+    assert_int_equal(budget_look(memory, BUDGET_CHECKS, beside, NULL), BUDGET_OTHERS);
+    assert_int_equal(budget_look(memory, BUDGET_SMALL, beside, NULL), BUDGET_FREE);
+    if (is_cancelled) {
+      assert_int_equal(queue_cancel(q, waiting), STORE_OK);
+    } else {
+      budget_give(memory, BUDGET_CHECKS, all / 4, NULL);
+      job *large = take(q, "large");
+      assert_int_equal(large->memory, all);
+      assert_int_equal(budget_look(memory, BUDGET_CHECKS, all / 4, NULL), BUDGET_OTHERS);
+      end_after(q, large, SECOND);
+    }
+    assert_int_equal(budget_look(memory, BUDGET_CHECKS, all / 4, NULL), BUDGET_FREE);
+    queue_destroy(q);
+    budget_destroy(memory);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_time_decides, stored_setup, stored_teardown),
@@ -382,6 +422,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_given_back, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_guests_pass_a_suspect, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_a_suspect_is_no_guest, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_a_job_claims_memory, stored_setup, stored_teardown),
       cmocka_unit_test(test_tasks_take_turns),
       cmocka_unit_test(test_tasks_share_memory),
       cmocka_unit_test(test_memory_of_files),
