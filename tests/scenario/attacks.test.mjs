@@ -11,7 +11,7 @@ import { promisify } from 'node:util';
 import { gzipSync } from 'node:zlib';
 import * as attacks from './support/attacks.mjs';
 import { binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
-import { megabytes, workers, workSeconds } from './support/processes.mjs';
+import { megabytes, ownSeconds, workers, workSeconds } from './support/processes.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const all = process.env.ORB_ATTACKS === 'all';
@@ -140,6 +140,30 @@ test('files that are made to cost much', async (t) => {
       });
     });
   }
+});
+
+test('the check of such a file ends with its client, and with the service', async (t) => {
+  const { d, evil } = await start(t);
+  const upload = (n, signal) =>
+    d.post('/v1/meshes', attacks.sharedIndices(2 << 20, 2000 + n), { headers: evil, signal }).catch((error) => error);
+  const client = new AbortController();
+  const asked = [0, 1].map((n) => upload(n, client.signal));
+  await sleep(300);
+  client.abort();
+  await Promise.all(asked);
+  await sleep(2000 * patience);
+  const spent = () => workSeconds(d) + ownSeconds(d);
+  const before = spent();
+  await sleep(3000);
+  assert.ok(spent() - before < 0.3, `${spent() - before} s of processor time after the clients were gone`);
+  const last = [2, 3].map((n) => upload(n));
+  await sleep(300);
+  const told = performance.now();
+  d.child.kill('SIGTERM');
+  await Promise.all(last);
+  assert.equal((await d.exited).code, 0, d.log);
+  const seconds = (performance.now() - told) / 1000;
+  assert.ok(seconds < 5 * patience * busy(), `it took ${seconds} s to stop`);
 });
 
 test('a large file of few triangles in two jobs at once', async (t) => {

@@ -37,6 +37,12 @@ export function megabytes(d, ...what) {
   return kilobytes / 1024;
 }
 
+/** Seconds of processor time of the daemon's own process. */
+export function ownSeconds(d) {
+  const fields = readFileSync(`/proc/${d.child.pid}/stat`, 'latin1').split(') ').pop().split(' ');
+  return (Number(fields[11]) + Number(fields[12])) / 100;
+}
+
 /** Seconds of processor time of the processes that checked meshes and ran jobs; some check further files. */
 export function workSeconds(d) {
   let ticks = 0; // of 1/100 s
