@@ -2,12 +2,15 @@
 
 #include <curl/curl.h>
 #include <errno.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <pthread.h>
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -40,8 +43,9 @@ typedef struct transfer {
   uint64_t sent, taken;
   size_t room; /* of out->text */
   int no_space;
-  char date[64];     /* of the answer */
-  int64_t signed_at; /* of s3_clock() */
+  curl_socket_t socket; /* of a connection that was used before; CURL_SOCKET_BAD: it is new */
+  char date[64];        /* of the answer */
+  int64_t signed_at;    /* of s3_clock() */
 } transfer;
 
 s3 *s3_open(const s3_options *options) {
@@ -201,6 +205,16 @@ static int read_header(const char *line, size_t size, const char *name, char *ou
   return 1;
 }
 
+/* Acknowledges what has arrived. Some servers, such as Ceph's, send the body after the headers, and Nagle's algorithm
+ * holds it back until these are acknowledged. This end would do that 40 ms later, in the hope of data to send along.
+ * The first bytes of a new connection are acknowledged at once. */
+static void acknowledge(const transfer *t) {
+  const int now = 1;
+  if (t->socket != CURL_SOCKET_BAD) {
+    setsockopt(t->socket, IPPROTO_TCP, TCP_QUICKACK, &now, sizeof now);
+  }
+}
+
 static size_t take_header(char *line, size_t one, size_t size, void *user) {
   transfer *t = user;
   s3_answer *out = t->out;
@@ -208,6 +222,9 @@ static size_t take_header(char *line, size_t one, size_t size, void *user) {
   if (!read_header(line, size, "ETag", out->tag, sizeof out->tag) &&
       !read_header(line, size, "Date", t->date, sizeof t->date)) {
     read_header(line, size, "x-amz-meta-sha256", out->meta, sizeof out->meta);
+  }
+  if (line[0] == '\r' || line[0] == '\n') { /* the end of the headers */
+    acknowledge(t);
   }
   return size;
 }
@@ -329,6 +346,10 @@ static void perform(s3 *store, transfer *t, const char *path, const char *url) {
   s3_answer *out = t->out;
   t->curl = take_handle(store);
   t->signed_at = s3_clock(store);
+  t->socket = CURL_SOCKET_BAD;
+  if (t->curl) {
+    curl_easy_getinfo(t->curl, CURLINFO_ACTIVESOCKET, &t->socket);
+  }
   if (!t->curl || !sign(store, t->request, path, t->signed_at, &headers) || !set_up(store, t, url, headers, error)) {
     snprintf(out->why, sizeof out->why, "the server has no memory left");
   } else {

@@ -11,7 +11,7 @@ import { list, s3 } from '../tools/s3.mjs';
 import { runProgram } from './support/cli.mjs';
 import { assertProblem, Daemon, daemon, root, samples, until } from './support/daemon.mjs';
 import { workers } from './support/processes.mjs';
-import { busy, denied, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
+import { apart, busy, denied, flipped, half, late, lost, s3Proxy, short } from './support/s3_proxy.mjs';
 import { bean, egg, obj, tetrahedron } from './support/shapes.mjs';
 
 const server = process.env.ORB_S3;
@@ -369,6 +369,23 @@ test('each request that fails is tried again: 503, lost answers, half a body, wr
     assert.ok(await keyOf('troubled', 'mesh', id));
   }
   assert.ok(!existsSync(path.join(d.data, 'quarantine')));
+});
+
+test('S3 that sends headers and body apart does not wait for the acknowledgement of the first', async (t) => {
+  const { d, empty } = await troubled(t, 'apart', ({ method }) => (method === 'GET' ? apart : undefined));
+  const urls = [];
+  for (let i = 0; i < 40; i++)
+    urls.push((await d.upload(Buffer.from(`# ${i}${' '.repeat(600)}\n${tetrahedron}`))).json.url);
+  await empty();
+  const took = [];
+  for (const url of urls) {
+    const began = performance.now();
+    assert.equal((await d.get(`${url}/file`)).status, 200);
+    took.push(performance.now() - began);
+  }
+  // Linux delays an acknowledgement by 40 ms at least, and that of the first packets of a connection not at all.
+  const last = took.slice(20);
+  assert.ok(Math.min(...last) < 35, `${took.map((ms) => ms.toFixed(0))} ms`);
 });
 
 test('a job that could not read its input runs again, also if S3 is back before it has failed', async (t) => {

@@ -15,6 +15,9 @@ export const late = 'late';
 export const half = 'half';
 /** Half of the body, as a whole answer. */
 export const short = 'short';
+/** Headers and body in packets of their own, of which Nagle's algorithm holds the second back until the first is
+ * acknowledged. */
+export const apart = 'apart';
 /** One bit of the body is another. */
 export const flipped = 'flipped';
 
@@ -26,6 +29,11 @@ function answer(how, from, body, response) {
   if (how === short && part.length) {
     headers['content-length'] = part.length;
     response.writeHead(from.statusCode, headers).end(part);
+  } else if (how === apart) {
+    response.socket.setNoDelay(false);
+    delete headers.connection; // the server closes each connection of the proxy
+    response.writeHead(from.statusCode, headers).flushHeaders();
+    setImmediate(() => response.end(body));
   } else if (how === half && part.length) {
     response.writeHead(from.statusCode, headers).write(part, () => response.destroy());
   } else {
