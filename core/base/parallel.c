@@ -37,8 +37,10 @@ enum {
   CLOSED = -1      /* as a chunk: no chunk can be claimed */
 };
 
-/* Seconds that a loop must take to be handed out to threads that spin, and to threads that have to be woken. */
-static const double WORTH_SHARING = 20e-6, WORTH_WAKING = 50e-6;
+/* Seconds that a loop must take to be handed out to threads that spin, and to threads that have to be woken. A shorter
+ * loop mostly waits for data from the other core's cache: with 20 and 50 µs, alignments of three pairs took 10 to 20 %
+ * more processor time on two threads, and as long. */
+static const double WORTH_SHARING = 80e-6, WORTH_WAKING = 150e-6;
 
 /* What an iteration of a body took, in seconds; 0: not known. */
 typedef struct loop_cost {
