@@ -1,6 +1,6 @@
 // Measures the studio with large shapes, and a bare three.js page that shows the same GLB in the same browser:
-//   node tests/studio/bench.mjs [LEVEL] [--software-compositing]
-// A shape has 20·4^LEVEL triangles; the default level is 7 (327,680 triangles). Prints one JSON object: the median
+//   node tests/studio/bench.mjs [TRIANGLES] [--software-compositing]
+// TRIANGLES of a shape: 100,000 by default; the next number 20·n² is taken (100,820). Prints one JSON object: the median
 // frame times (ms) of both pages while scrubbing, the ratio of each round and their median, and for each step the long
 // tasks of the main thread with their CPU time (see bench/tasks.mjs). The ratio of the means as well, since a page may
 // miss animation frames. A stub replaces the daemon, so that only the page (client/web/dist) is measured.
@@ -14,7 +14,7 @@ import { traced } from './bench/tasks.mjs';
 import { wholeBrowser } from '../tools/chromium.mjs';
 import { counted, root, startBrowser, until } from './support.mjs';
 
-const level = Number(process.argv.slice(2).find((a) => /^\d+$/.test(a)) ?? 7);
+const wanted = Number(process.argv.slice(2).find((a) => /^\d+$/.test(a)) ?? 100_000);
 const compositing = process.argv.includes('--software-compositing') ? 'software' : 'gpu';
 
 const BARE = `<!doctype html><style>html,body{margin:0}</style>
@@ -40,7 +40,7 @@ scrub(0);
 globalThis.ready = true;
 </script>`;
 
-const sphere = icosphere(level);
+const sphere = icosphere(Math.ceil(Math.sqrt(wanted / 20)));
 const vertices = sphere.points.length / 3;
 const triangles = sphere.faces.length / 3;
 const asset = glb(sphere);

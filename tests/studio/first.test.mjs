@@ -2,7 +2,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { browser, daemon } from './started.mjs';
-import { addFiles, button, defaultShown, openPage, sample, settled, shownToasts, until } from './support.mjs';
+import { addFiles, button, defaultShown, json, openPage, sample, settled, shownToasts, until } from './support.mjs';
 
 const isFast = (request) => request.postDataJSON().align?.options?.preset === 'fast';
 const refuse = (route, title) =>
@@ -84,6 +84,48 @@ test('the default morph replaces the fast one and keeps time, camera and view', 
   const waiting = page.waitForEvent('download');
   await page.getByRole('link', { name: 'Download GLB' }).click();
   assert.ok((await waiting).url().includes(now), 'the default morph is downloaded');
+  await done();
+});
+
+test('the fast morph takes the cheap way to a common mesh, unless the options name another', async () => {
+  const asked = [];
+  const { page, posted, done } = await pageWith((kind, route) => {
+    asked.push(route.request().postDataJSON().remesh);
+    return kind === 'fast' ? route.continue() : refuse(route, 'No default morph');
+  });
+  const failed = page.getByRole('alert').getByText('No default morph');
+  await morph(page, posted);
+  await failed.waitFor();
+  assert.deepEqual(
+    asked.map(({ method }) => method),
+    ['convex-hull', 'adaptive'],
+  );
+  // the hull has every vertex of both shapes, and landmarks are one vertex of both
+  const { supermeshes } = await json(daemon.url, '/v1/supermeshes');
+  const { vertices, shapes, landmarks } = supermeshes.find(({ request }) => request.remesh.method === 'convex-hull');
+  const meshes = await Promise.all(shapes.map(({ mesh }) => json(daemon.url, `/v1/meshes/${mesh}`)));
+  assert.equal(vertices, meshes[0].vertices + meshes[1].vertices - landmarks.length);
+
+  await page.getByText('Options', { exact: true }).click();
+  await page.getByLabel('Most triangles').fill('4000');
+  await button(page, 'Morph again').click();
+  await until(() => asked.length === 4, 'both are requested again');
+  await failed.waitFor();
+  assert.deepEqual(
+    asked.slice(2).map(({ method, max_triangles }) => [method, max_triangles]),
+    [
+      ['adaptive', 4000],
+      ['adaptive', 4000],
+    ],
+  );
+  await page.getByLabel('Common mesh').selectOption('overlay');
+  await button(page, 'Morph again').click();
+  await until(() => asked.length === 6, 'both are requested once more');
+  await failed.waitFor();
+  assert.deepEqual(
+    asked.slice(4).map(({ method }) => method),
+    ['overlay', 'overlay'],
+  );
   await done();
 });
 
@@ -170,12 +212,10 @@ test('progress names the morph and its stage', async () => {
       if (text) globalThis.stages.add(text);
     }).observe(document.body, { subtree: true, childList: true, characterData: true });
   });
+  // a request of its own, or its answer may be stored
   await button(page, 'Shapes', { exact: true }).click();
   await page.getByText('Options', { exact: true }).click();
-  await page.getByRole('slider', { name: /^Tolerance/ }).evaluate((input) => {
-    input.value = '-3.5';
-    input.dispatchEvent(new Event('input', { bubbles: true }));
-  });
+  await page.getByLabel('Most triangles').fill('9000');
   await morph(page, posted);
   await until(() => button(page, 'Pause').count(), 'the fast morph plays');
   open();
@@ -204,11 +244,10 @@ test('progress draws no shape again: without a GPU that takes a core from the da
     document.querySelector('.stage').addEventListener('drawn', () => globalThis.drawings++);
   });
   await morph(page, posted);
-  await until(async () => /^0:0[2-9]/.test(await page.locator('.progress .hint').first().innerText()), 'two seconds');
+  await until(async () => /^\d+:(0[2-9]|[1-5]\d)/.test(await page.locator('.progress .hint').first().innerText()), 'two seconds');
   assert.equal(await page.evaluate(() => globalThis.drawings), 0);
   open();
-  await until(() => button(page, 'Pause').count(), 'the fast morph plays');
-  assert.ok((await page.evaluate(() => globalThis.drawings)) > 0);
+  await until(() => page.evaluate(() => globalThis.drawings), 'the fast morph is drawn');
   await defaultShown(page);
   await done();
 });

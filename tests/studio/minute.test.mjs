@@ -5,10 +5,10 @@ import { readFile, writeFile } from 'node:fs/promises';
 import { pathToFileURL } from 'node:url';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { basename, join } from 'node:path';
+import { join } from 'node:path';
 import { browser, daemon } from './started.mjs';
 import { countPixels, difference, shot } from './pictures.mjs';
-import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
+import { addFiles, counted, button, defaultShown, dropFiles, openPage, sample, settled, until } from './support.mjs';
 import { morphOf } from '../scenario/support/glb.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { readPng, writePng } from '../scenario/support/png.mjs';
@@ -41,21 +41,6 @@ test('the first page plays a morph without a click, and offers three more', asyn
   await counted(page.locator('.card.ready'), 3, 'its shapes are open');
   await done();
 });
-
-/** Drops files on the page, as from a folder. */
-async function dropFiles(page, ...paths) {
-  const files = await Promise.all(
-    paths.map(async (path) => [basename(path), (await readFile(path)).toString('base64')]),
-  );
-  const data = await page.evaluateHandle((list) => {
-    const transfer = new DataTransfer();
-    for (const [name, bytes] of list)
-      transfer.items.add(new File([Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0))], name));
-    return transfer;
-  }, files);
-  for (const event of ['dragenter', 'dragover', 'drop'])
-    await page.dispatchEvent('body', event, { dataTransfer: data });
-}
 
 test('two files that are dropped on the first page morph without a click; a third does not', async () => {
   const { page, done } = await openPage(browser, daemon.url);

@@ -3,8 +3,9 @@
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { readFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { basename, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { chromium } from 'playwright-core';
 import { executablePath, softwareGl } from '../tools/chromium.mjs';
@@ -164,6 +165,21 @@ export async function addFiles(page, ...files) {
   );
   await counted(page.getByText('reading…'), 0, 'the shapes are read');
   await settled(page);
+}
+
+/** Drops files on the page, as from a folder. */
+export async function dropFiles(page, ...paths) {
+  const files = await Promise.all(
+    paths.map(async (path) => [basename(path), (await readFile(path)).toString('base64')]),
+  );
+  const data = await page.evaluateHandle((list) => {
+    const transfer = new DataTransfer();
+    for (const [name, bytes] of list)
+      transfer.items.add(new File([Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0))], name));
+    return transfer;
+  }, files);
+  for (const event of ['dragenter', 'dragover', 'drop'])
+    await page.dispatchEvent('body', event, { dataTransfer: data });
 }
 
 /** Waits until the default morph has replaced the fast one. The studio of 8bbd71c has one morph, without a name (ORB_BEFORE). */

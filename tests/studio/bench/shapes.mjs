@@ -1,116 +1,56 @@
-// Two shapes on one icosphere of 20·4^steps triangles: as OBJ files, and merged as a GLB with one morph target.
+// Two shapes on one icosphere: as OBJ files, and merged as a GLB with one morph target.
 
-export function icosphere(steps) {
-  const t = (1 + Math.sqrt(5)) / 2;
-  const count = 10 * 4 ** steps + 2;
-  const points = new Float64Array(3 * count);
-  let n = 0;
-  const add = (x, y, z) => {
-    const l = Math.hypot(x, y, z);
-    points.set([x / l, y / l, z / l], 3 * n);
-    return n++;
-  };
-  for (const p of [
-    [-1, t, 0],
-    [1, t, 0],
-    [-1, -t, 0],
-    [1, -t, 0],
-    [0, -1, t],
-    [0, 1, t],
-    [0, -1, -t],
-    [0, 1, -t],
-    [t, 0, -1],
-    [t, 0, 1],
-    [-t, 0, -1],
-    [-t, 0, 1],
-  ])
-    add(...p);
-  let faces = Uint32Array.of(
-    0,
-    11,
-    5,
-    0,
-    5,
-    1,
-    0,
-    1,
-    7,
-    0,
-    7,
-    10,
-    0,
-    10,
-    11,
-    1,
-    5,
-    9,
-    5,
-    11,
-    4,
-    11,
-    10,
-    2,
-    10,
-    7,
-    6,
-    7,
-    1,
-    8,
-    3,
-    9,
-    4,
-    3,
-    4,
-    2,
-    3,
-    2,
-    6,
-    3,
-    6,
-    8,
-    3,
-    8,
-    9,
-    4,
-    9,
-    5,
-    2,
-    4,
-    11,
-    6,
-    2,
-    10,
-    8,
-    6,
-    7,
-    9,
-    8,
-    1,
-  );
-  for (let step = 0; step < steps; step++) {
-    const middles = new Map();
-    const middle = (a, b) => {
-      const key = Math.min(a, b) * 2 ** 26 + Math.max(a, b);
-      let m = middles.get(key);
-      if (m === undefined) {
-        m = add(
-          points[3 * a] + points[3 * b],
-          points[3 * a + 1] + points[3 * b + 1],
-          points[3 * a + 2] + points[3 * b + 2],
-        );
-        middles.set(key, m);
-      }
-      return m;
-    };
-    const finer = new Uint32Array(4 * faces.length);
-    for (let f = 0; f < faces.length; f += 3) {
-      const [a, b, c] = [faces[f], faces[f + 1], faces[f + 2]];
-      const [x, y, z] = [middle(a, b), middle(b, c), middle(c, a)];
-      finer.set([a, x, z, x, b, y, z, y, c, x, y, z], 4 * f);
+const GOLDEN = (1 + Math.sqrt(5)) / 2;
+const CORNERS = [
+  [-1, GOLDEN, 0],
+  [1, GOLDEN, 0],
+  [-1, -GOLDEN, 0],
+  [1, -GOLDEN, 0],
+  [0, -1, GOLDEN],
+  [0, 1, GOLDEN],
+  [0, -1, -GOLDEN],
+  [0, 1, -GOLDEN],
+  [GOLDEN, 0, -1],
+  [GOLDEN, 0, 1],
+  [-GOLDEN, 0, -1],
+  [-GOLDEN, 0, 1],
+];
+const SIDES =
+  '0 11 5, 0 5 1, 0 1 7, 0 7 10, 0 10 11, 1 5 9, 5 11 4, 11 10 2, 10 7 6, 7 1 8, 3 9 4, 3 4 2, 3 2 6, 3 6 8, 3 8 9, 4 9 5, 2 4 11, 6 2 10, 8 6 7, 9 8 1'
+    .split(', ')
+    .map((side) => side.split(' ').map(Number));
+
+/** A sphere of 20·parts² triangles: each edge of an icosahedron has so many parts. */
+export function icosphere(parts) {
+  const points = [];
+  const faces = [];
+  const known = new Map();
+  /** The number of a point of a side, which its neighbours may have added. */
+  const numberOf = ([a, b, c], j, k) => {
+    const weighted = [
+      [a, parts - j - k],
+      [b, j],
+      [c, k],
+    ].filter(([, weight]) => weight > 0);
+    const key = weighted
+      .sort(([v], [w]) => v - w)
+      .flat()
+      .join(' ');
+    if (!known.has(key)) {
+      const p = [0, 1, 2].map((axis) => weighted.reduce((sum, [v, weight]) => sum + weight * CORNERS[v][axis], 0));
+      known.set(key, known.size);
+      points.push(...p.map((x) => x / Math.hypot(...p)));
     }
-    faces = finer;
-  }
-  return { points, faces };
+    return known.get(key);
+  };
+  for (const side of SIDES)
+    for (let j = 0; j < parts; j++)
+      for (let k = 0; k < parts - j; k++) {
+        const [here, right, up] = [numberOf(side, j, k), numberOf(side, j + 1, k), numberOf(side, j, k + 1)];
+        faces.push(here, right, up);
+        if (j + k < parts - 1) faces.push(right, numberOf(side, j + 1, k + 1), up);
+      }
+  return { points: Float64Array.from(points), faces: Uint32Array.from(faces) };
 }
 
 const RADII = [

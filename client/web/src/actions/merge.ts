@@ -59,12 +59,24 @@ export function buildRequest(find = false): SupermeshRequest {
   return request;
 }
 
+/**
+ * Up to this many triangles of all shapes, the hull of their vertices is made in a fraction of the time of the adaptive
+ * mesh (0.08 instead of 0.35 s at 28,000 triangles). It has as many triangles as the shapes, so beyond 100,000 it takes longer.
+ */
+const HULL_MOST = 60_000;
+
 /** The same request with the fast preset; null where the method has none. */
 function fastRequest(request: SupermeshRequest): SupermeshRequest | null {
   const method = request.align?.method;
   if (method === 'rbf' || method === 'rotate') return null;
   const { transfer: _, ...bare } = request; // pictures would be baked twice
-  return { ...bare, align: { ...request.align, options: { preset: 'fast' } } };
+  const triangles = readyShapes().reduce((sum, { mesh }) => sum + mesh!.triangles, 0);
+  const hull = request.remesh?.method === 'adaptive' && !request.remesh.max_triangles && triangles <= HULL_MOST;
+  return {
+    ...bare,
+    align: { ...request.align, options: { preset: 'fast' } },
+    ...(hull && { remesh: { method: 'convex-hull' } }),
+  };
 }
 
 export async function startMerge(purpose: Running['purpose'] = 'morph') {
