@@ -56,7 +56,6 @@ static budget_room room_for(tasks *pool, task *t) {
 /* A thread is free: claims the memory of this task. NULL: none waits. */
 static void claim_memory(tasks *pool, const task *t) {
   if (pool->memory && (t || pool->claim.bytes > 0)) {
-    pool->claim.part = t ? t->part : pool->claim.part;
     budget_claim_bytes(pool->memory, &pool->claim, t ? t->memory : 0);
   }
 }
@@ -72,7 +71,7 @@ static task *choose(tasks *pool) {
     const struct turn *a = turn_of(pool, *at), *b = best ? turn_of(pool, *best) : NULL;
     if (room != BUDGET_FREE) {
       pool->lacking = 1;
-      waiting = !waiting && room == BUDGET_OTHERS && (*at)->part != BUDGET_SMALL ? *at : waiting;
+      waiting = !waiting && room == BUDGET_OTHERS && (*at)->part == pool->claim.part ? *at : waiting;
     } else if (!b || a->running < b->running || (a->running == b->running && a->used_ms < b->used_ms)) {
       best = at;
     }
@@ -100,6 +99,8 @@ static void run(tasks *pool, task *t) {
   t->run(t); /* may free t */
   if (pool->memory && memory > 0) {
     budget_give(pool->memory, part, memory, NULL);
+  } else if (pool->memory) {
+    budget_tell(pool->memory, NULL); /* it may have claimed memory until it was no longer wanted */
   }
   pthread_mutex_lock(&pool->lock);
   turn->running--;
@@ -145,6 +146,7 @@ tasks *tasks_start(int threads, memory_budget *memory) {
   }
   pool->last = &pool->first;
   pool->memory = memory;
+  pool->claim.part = BUDGET_CHECKS;
   pthread_mutex_init(&pool->lock, NULL);
   wake_init(&pool->wake);
   if (memory) {

@@ -19,7 +19,7 @@
 #include "isolate/sandbox.h"
 #include "log.h"
 
-enum { PASSED_MOST = 2, HELLO_MS = 20000, PROCESSES = 1024, STATUS_MS = 2000 };
+enum { PASSED_MOST = 2, HELLO_MS = 60000, PROCESSES = 1024, STATUS_MS = 2000 };
 
 extern char **environ;
 

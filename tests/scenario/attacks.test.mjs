@@ -114,7 +114,11 @@ async function start(t, ...args) {
 const files = [
   ['accessors that overlap, compressed', 'no-memory', () => attacks.overlappingAccessors((all ? 64 : 16) << 20), true],
   ['positions that collide', 'not-closed', () => attacks.collidingPositions(all ? 40_000 : 16_000)],
-  ['names of materials that collide', 'degenerate', () => attacks.collidingNames(all ? 180_000 : 60_000)],
+  [
+    'names of materials that collide',
+    all ? 'too-large' : 'degenerate',
+    () => attacks.collidingNames(all ? 180_000 : 60_000),
+  ],
   ['two thousand primitives on one accessor', 'too-large', () => attacks.sharedIndices()],
   [
     'a polygon of millions of corners',

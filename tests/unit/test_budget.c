@@ -237,10 +237,47 @@ static void test_tasks(void **state) {
   budget_destroy(b);
 }
 
+static void count_call(void *user) {
+  ++*(atomic_int *)user;
+}
+
+/* Where a task that claims memory is no longer wanted, others are told. */
+static void test_claim_of_a_task_ends(void **state) {
+  (void)state;
+  const int64_t j = 4096 * MB;
+  atomic_int calls = 0;
+  memory_budget *b = budget_create(j);
+  budget_listen(b, count_call, &calls);
+  tasks *pool = tasks_start(1, b);
+  assert_non_null(pool);
+  assert_int_equal(budget_take(b, BUDGET_JOBS, 3 * j / 4, NULL), BUDGET_FREE);
+  waiting_task w = {.t = {.run = run_task, .is_wanted = task_is_wanted, .memory = j / 2, .part = BUDGET_CHECKS},
+                    .is_wanted = 1};
+  tasks_add(pool, &w.t);
+  while (budget_look(b, BUDGET_JOBS, j / 8, NULL) != BUDGET_OTHERS) {
+    nap(1);
+  }
+  const int before = calls;
+  w.is_wanted = 0;
+  wait_for(&w);
+  while (calls == before) {
+    nap(1);
+  }
+  assert_int_equal(budget_look(b, BUDGET_JOBS, j / 8, NULL), BUDGET_FREE);
+  tasks_stop(pool);
+  tasks_free(pool);
+  budget_destroy(b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_all_together),     cmocka_unit_test(test_promises), cmocka_unit_test(test_jobs_leave_room),
-      cmocka_unit_test(test_no_longer_wanted), cmocka_unit_test(test_claims),   cmocka_unit_test(test_tasks),
+      cmocka_unit_test(test_all_together),
+      cmocka_unit_test(test_promises),
+      cmocka_unit_test(test_jobs_leave_room),
+      cmocka_unit_test(test_no_longer_wanted),
+      cmocka_unit_test(test_claims),
+      cmocka_unit_test(test_tasks),
+      cmocka_unit_test(test_claim_of_a_task_ends),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
