@@ -134,8 +134,6 @@ void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now);
 /* The threads of a job that was entered: its part of the cores. beside: the jobs that could run now as well. */
 int schedule_threads(const queue *q, const job *j, int64_t beside);
 int schedule_take_memory(queue *q, queue_lane lane, job *j);
-/* No worker waits for the memory that is claimed. */
-void schedule_drop_claim(queue *q);
 /* The most triangles of a job for which the lane has memory, −1: none; *big: also for one that needs all. */
 int64_t schedule_room(const queue *q, queue_lane lane, int *big);
 void table_add(queue *q, job *j);
@@ -143,6 +141,8 @@ job *table_with_id(const queue *q, const char *id); /* also one that is not comm
 void table_forget(queue *q, job *j);                /* an unfinished job that nobody here wants */
 void table_drop_key(queue *q, job *j);              /* removes an ended job from the unfinished ones */
 void table_ended(queue *q, job *j);
+/* No worker waits for the memory that is claimed. */
+void table_drop_claim(queue *q);
 job *table_find(queue *q, const char *key, const char *owner); /* an unfinished job, or NULL */
 int table_key_taken(const queue *q, const job *by_other);      /* a worker has another job with the same key */
 /* A job for a request, in the table, not yet committed, with a reference for the caller; NULL: out of memory. */

@@ -76,13 +76,6 @@ static int admits(const queue *q, queue_lane lane, const job *j, int kept) {
   return q->owners[j->owner].running == 0 && (computing >= workers || !fits || kept);
 }
 
-void schedule_drop_claim(queue *q) {
-  if (q->claim.bytes > 0) {
-    budget_claim_bytes(q->options.memory, &q->claim, 0);
-    budget_tell(q->options.memory, q);
-  }
-}
-
 /* A worker is free: claims the memory of the oldest job that waits for checks alone. */
 static void claim_memory(queue *q, int64_t now) {
   int64_t bytes = 0;
@@ -92,7 +85,7 @@ static void claim_memory(queue *q, int64_t now) {
     }
   }
   if (bytes < q->claim.bytes) {
-    schedule_drop_claim(q);
+    table_drop_claim(q);
   }
   if (bytes > 0) {
     budget_claim_bytes(q->options.memory, &q->claim, bytes);
@@ -158,7 +151,7 @@ int schedule_take_memory(queue *q, queue_lane lane, job *j) {
   const int taken = bytes == 0 || budget_take(q->options.memory, part_of(lane), bytes, &q->claim) == BUDGET_FREE;
   j->memory = taken ? bytes : 0;
   if (taken && lane == QUEUE_COMPUTES) { /* the next worker that waits claims again */
-    schedule_drop_claim(q);
+    table_drop_claim(q);
   }
   return taken;
 }

@@ -40,6 +40,13 @@ void table_add(queue *q, job *j) {
   owner_enter(q, j);
 }
 
+void table_drop_claim(queue *q) {
+  if (q->claim.bytes > 0) {
+    budget_claim_bytes(q->options.memory, &q->claim, 0);
+    budget_tell(q->options.memory, q);
+  }
+}
+
 void table_drop_key(queue *q, job *j) {
   for (job **at = &q->by_key[bucket(j->row.key)]; *at; at = &(*at)->next_key) {
     if (*at == j) {
@@ -53,7 +60,7 @@ void table_drop_key(queue *q, job *j) {
   q->unfinished_fetches -= fetches(j);
   owner_leave(q, j);
   if (q->claim.bytes > 0) { /* perhaps for this job */
-    schedule_drop_claim(q);
+    table_drop_claim(q);
     wake_workers(q);
   }
 }

@@ -2,8 +2,8 @@
  *
  *     bench-profile FILE.glb [OUT]
  *
- * Prints a line of JSON for each profile: bytes, milliseconds of processor time, bytes of memory and bounds. With OUT also writes
- * OUT.PROFILE.glb. */
+ * Prints a line of JSON for each profile: bytes, milliseconds of processor time, bytes of memory and bounds. With OUT
+ * also writes OUT.PROFILE.glb. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -244,7 +244,10 @@ test('progress draws no shape again: without a GPU that takes a core from the da
     document.querySelector('.stage').addEventListener('drawn', () => globalThis.drawings++);
   });
   await morph(page, posted);
-  await until(async () => /^\d+:(0[2-9]|[1-5]\d)/.test(await page.locator('.progress .hint').first().innerText()), 'two seconds');
+  await until(
+    async () => /^\d+:(0[2-9]|[1-5]\d)/.test(await page.locator('.progress .hint').first().innerText()),
+    'two seconds',
+  );
   assert.equal(await page.evaluate(() => globalThis.drawings), 0);
   open();
   await until(() => page.evaluate(() => globalThis.drawings), 'the fast morph is drawn');
