@@ -12,7 +12,7 @@ import { addFiles, counted, button, defaultShown, dropFiles, openPage, sample, s
 import { morphOf } from '../scenario/support/glb.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { readPng, writePng } from '../scenario/support/png.mjs';
-import { ball, threeMf } from '../scenario/support/shapes.mjs';
+import { ball, obj, reversed, threeMf } from '../scenario/support/shapes.mjs';
 
 /** Pixels of a shape on the first page: they are more saturated than its background. */
 const vivid = (r, g, b) => Math.max(r, g, b) - Math.min(r, g, b) > 70;
@@ -396,6 +396,32 @@ test('after a repair, picture and counts are those of the repaired mesh', async 
     Number((await page.locator('.caption').innerText()).match(/([\d\s]+) triangles/)[1].replace(/\D/g, ''));
   assert.ok(mesh.triangles > 5600 - 60, String(mesh.triangles));
   await until(async () => (await said()) === mesh.triangles, `${mesh.triangles} triangles`);
+  await done();
+});
+
+test('a shape whose triangles faced inwards is shown as the daemon faced them', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const add = (name, shape) =>
+    page
+      .locator('input[type=file]')
+      .first()
+      .setInputFiles([{ name, mimeType: 'text/plain', buffer: Buffer.from(obj(shape)) }]);
+  const tinted = (r, _g, b) => Math.abs(r - b) > 40;
+  const drawn = async () => {
+    await settled(page);
+    return countPixels(page, '.pane-view', tinted);
+  };
+  await add('outwards.obj', ball());
+  await counted(page.locator('.card.ready'), 1, 'it is accepted');
+  const whole = await drawn();
+  assert.ok(whole > 4000, String(whole));
+  await button(page, 'Remove outwards').click();
+  await add(
+    'partly.obj',
+    reversed(ball(), (t) => t % 5 === 0),
+  );
+  await page.getByText(/^Repaired: reorient/).waitFor();
+  await until(async () => Math.abs((await drawn()) - whole) < 0.01 * whole, 'the ball has no gaps');
   await done();
 });
 

@@ -45,8 +45,8 @@ async function draw(shape: Shape, buffer: ArrayBuffer) {
   }
 }
 
-/** Repairs after which the surface is another one than that of the file. */
-const RESHAPING = ['fill_holes', 'largest_component', 'close_handles', 'split_nonmanifold', 'part'];
+/** Repairs after which the surface looks otherwise than in the file: triangles that faced inwards are not drawn. */
+const RESHAPING = ['fill_holes', 'largest_component', 'close_handles', 'split_nonmanifold', 'part', 'reorient'];
 
 /**
  * Shows what the daemon made of a file where that differs from the file, or where only the daemon can read it. The mesh
