@@ -116,7 +116,7 @@ test('a small file with a hole of very many edges is checked with the memory tha
   });
   const filled = await d.upload(bowl, { repair: 'fill_holes' });
   assert.equal(filled.status, 201, filled.bytes.toString());
-  assert.ok(filled.json.triangles > 10 * edges, `${filled.json.triangles} triangles`);
+  assert.ok(filled.json.triangles > 8 * edges, `${filled.json.triangles} triangles`); // docs/limits.md: 16,384 at most
 });
 
 test('repairs that change the shape happen only on request', async (t) => {
