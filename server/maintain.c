@@ -169,6 +169,14 @@ static void close_both(tally *t) {
   objects_close(t->store);
 }
 
+/* found: how many rows are wrong; −1: they cannot be read. */
+static void count_wrong(tally *t, int64_t found, const char *what) {
+  if (found != 0) {
+    puts(found < 0 ? "the rows of the catalogue cannot be read" : what);
+    t->wrong++;
+  }
+}
+
 int maintain_check(const config *options) {
   tally t = {0};
   if (!open_both(options, &t)) {
@@ -179,14 +187,8 @@ int maintain_check(const config *options) {
     puts("the catalogue fails SQLite's integrity check");
     t.wrong++;
   }
-  if (catalogue_mismatches(t.cat) != 0) {
-    puts("the catalogue's owners or stored sums do not match its rows");
-    t.wrong++;
-  }
-  if (catalogue_damaged(t.cat) != 0) {
-    puts("the catalogue has rows with invalid values");
-    t.wrong++;
-  }
+  count_wrong(&t, catalogue_mismatches(t.cat), "the catalogue's owners or stored sums do not match its rows");
+  count_wrong(&t, catalogue_damaged(t.cat), "the catalogue has rows with invalid values");
   each_resource(&t);
   if (objects_each(t.store, each_object, &t) != STORE_OK) {
     puts("some folders of objects cannot be read");

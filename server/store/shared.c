@@ -424,10 +424,15 @@ store_result catalogue_shared_of(catalogue *cat, const char *owner, int64_t *run
 }
 
 int catalogue_maintain(catalogue *cat) {
-  if (!catalogue_is_shared(cat)) {
+  if (!database_is_url(catalogue_path(cat))) {
     return 1;
   }
   database *db = catalogue_reader(cat);
+  database_execute(db, "SET statement_timeout=0"); /* a thread that runs alone always gets this reader */
+  if (!catalogue_is_shared(cat)) {
+    catalogue_reader_done(cat, db);
+    return 1;
+  }
   sql_statement *st = database_statement(db, "SELECT pg_try_advisory_lock(?1::int, hashtext(current_schema()))::int");
   if (st) {
     sql_bind_integer(st, 1, SQL_LOCK_MAINTAIN);

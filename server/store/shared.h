@@ -90,7 +90,7 @@ store_result catalogue_shared_numbers(catalogue *cat, shared_numbers *out);
 /* An owner's running and other unfinished jobs. */
 store_result catalogue_shared_of(catalogue *cat, const char *owner, int64_t *running, int64_t *queued);
 /* For --gc and --check-data: 0: another process does either on this catalogue. Else none can until this catalogue is
- * closed. Also for a catalogue that is not shared. */
+ * closed. Questions that read all rows may then take as long as they need. Also for a catalogue that is not shared. */
 int catalogue_maintain(catalogue *cat);
 /* Whether an unfinished job (of this owner, unless NULL) names a mesh. */
 int catalogue_needs_mesh(catalogue *cat, const char *mesh, const char *owner);
