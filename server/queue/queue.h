@@ -19,7 +19,8 @@
  * counts the death and queues the job again, until it has died CRASHES_MOST times. With isolate = off the daemon dies,
  * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/recover.c counts.
  * With several nodes (shared.h), the others do that for a node whose lease expired: catalogue_recover_lost() in
- * store/recover.c. New requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
+ * store/recover.c; a lost node counts from the job's 20th attempt on. New requests for work whose processes died
+ * CRASHES_MOST times are refused (store/crashes.h).
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
  * authoritative: the queue shows a job as accepted, running or ended only after its row was committed, so everything a

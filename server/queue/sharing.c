@@ -77,12 +77,17 @@ static void heard(void *user, const char *text) {
   }
 }
 
+/* The loss of a node is hardly ever the fault of a job that has a process of its own, which the kernel limits: nodes
+ * are killed, paused or starved. So it counts against the job only from this attempt on, which ends a job that takes
+ * each of its nodes along. */
+enum { ATTEMPTS_BORNE = 20 };
+
 /* Queues the jobs of nodes that are gone. Waits for nothing: this thread must renew its own lease. */
 static void take_over(queue *q) {
   api_text text = {0};
   crash_problem(&text);
   if (!text.failed) {
-    catalogue_recover_lost(q->cat, CRASHES_MOST, unix_ms(), text.data);
+    catalogue_recover_lost(q->cat, CRASHES_MOST, q->isolated ? ATTEMPTS_BORNE : 1, unix_ms(), text.data);
   }
   api_text_free(&text);
 }

@@ -211,8 +211,9 @@ store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, co
 /* Where several nodes share the jobs: queues the jobs that this node ran before its restart. last_life: its name then;
  * "": none. */
 store_result catalogue_recover_own(catalogue *cat, const char *last_life);
-/* The same as catalogue_recover() for jobs of nodes whose lease has expired; does not wait for the commit. */
-void catalogue_recover_lost(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
+/* The same as catalogue_recover() for jobs of nodes whose lease has expired; does not wait for the commit.
+ * counted_from: the loss of a node on which a job runs alone counts as its crash from this attempt on. */
+void catalogue_recover_lost(catalogue *cat, int most_crashes, int counted_from, int64_t now, const char *crash_problem);
 /* Lists unfinished jobs after sequence number `after`, oldest first. */
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out);
 

@@ -8,6 +8,7 @@ typedef struct recovery {
   const char *node;    /* the node's name before its restart; "": none */
   int others;          /* also the jobs of other nodes whose lease has expired */
   int most_crashes;    /* 0: the jobs had processes of their own, and their ends were counted */
+  int counted_from;    /* attempts of a job: the loss of a node counts from this one on */
   const char *problem; /* of a job that crashed so often */
   int64_t now;
 } recovery;
@@ -116,11 +117,16 @@ static int recover_lost(database *db, void *arg) {
   if (code != SQL_OK || !c->others) {
     return code;
   }
-  code = database_run(
-      db, database_statement(db,
-                             "UPDATE job SET state=0, crashes=crashes+alone, alone=0,"
-                             " suspect=CASE kind WHEN 2 THEN 0 ELSE 1 END"
-                             " WHERE state=1 AND node NOT IN (SELECT name FROM node WHERE until>=clock_ms())"));
+  st =
+      database_statement(db,
+                         "UPDATE job SET state=0, crashes=crashes+CASE WHEN attempt>=?1 THEN alone ELSE 0 END, alone=0,"
+                         " suspect=CASE kind WHEN 2 THEN 0 ELSE 1 END"
+                         " WHERE state=1 AND node NOT IN (SELECT name FROM node WHERE until>=clock_ms())");
+  code = SQL_ERROR;
+  if (st) {
+    sql_bind_integer(st, 1, c->counted_from);
+    code = database_run(db, st);
+  }
   if (code == SQL_OK && sql_changes(db) > 0) {
     log_warn("jobs of a node that was silent beyond its lease are queued again");
   }
@@ -142,12 +148,18 @@ typedef struct lost_arg {
   char problem[];
 } lost_arg;
 
-void catalogue_recover_lost(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem) {
+void catalogue_recover_lost(catalogue *cat, int most_crashes, int counted_from, int64_t now,
+                            const char *crash_problem) {
   size_t size = strlen(crash_problem) + 1;
   lost_arg *a = calloc(1, sizeof *a + size);
   if (a) {
     memcpy(a->problem, crash_problem, size);
-    a->what = (recovery){.node = "", .others = 1, .most_crashes = most_crashes, .now = now, .problem = a->problem};
+    a->what = (recovery){.node = "",
+                         .others = 1,
+                         .most_crashes = most_crashes,
+                         .counted_from = counted_from,
+                         .now = now,
+                         .problem = a->problem};
     catalogue_write_later(cat, recover_lost, a);
   }
 }

@@ -209,7 +209,7 @@ static void test_lease(void **state) {
   while (!catalogue_lost_jobs(n->cat[1], LEASE_MS)) {
     usleep(20000);
   }
-  catalogue_recover_lost(n->cat[1], 3, 7, "{}");
+  catalogue_recover_lost(n->cat[1], 3, 1, 7, "{}");
   assert_int_equal(catalogue_job_cancel(n->cat[1], "none"), STORE_OK); /* waits for that write */
   assert_int_equal(claim(n, 1, &taken), STORE_OK);
   assert_string_equal(taken.row.id, row.id);
@@ -224,20 +224,21 @@ static void test_lease(void **state) {
   job_row_free(&got);
 }
 
-/* The third node that falls silent while the job runs alone ends it. */
-static void test_crashes(void **state) {
-  nodes *n = *state;
+/* The third node that falls silent while the job runs alone ends it. Earlier attempts than counted_from do not count.
+ */
+static void lose_nodes(nodes *n, int counted_from, int deaths) {
   job_row row, got;
   job_claim c;
   submit(n, 0, "ann", '1', 0, &row);
-  for (int death = 0; death < 4; death++) {
+  for (int death = 0; death < deaths; death++) {
     assert_int_equal(claim(n, 0, &c), STORE_OK);
     assert_int_equal(c.row.alone, death > 0);
+    assert_int_equal(c.row.attempt, death + 1);
     assert_true(notices_renew(n->bell[0], node_names[0], 1, 0));
     while (!catalogue_lost_jobs(n->cat[1], LEASE_MS)) {
       usleep(20000);
     }
-    catalogue_recover_lost(n->cat[1], 3, 7, "{\"crashed\":1}");
+    catalogue_recover_lost(n->cat[1], 3, counted_from, 7, "{\"crashed\":1}");
     assert_int_equal(catalogue_job_cancel(n->cat[1], "none"), STORE_OK); /* waits for that write */
     assert_true(notices_renew(n->bell[0], node_names[0], 1, 60000));
   }
@@ -246,6 +247,14 @@ static void test_crashes(void **state) {
   assert_string_equal(got.problem, "{\"crashed\":1}");
   job_row_free(&got);
   assert_int_equal(claim(n, 0, &c), STORE_NOT_FOUND);
+}
+
+static void test_crashes(void **state) {
+  lose_nodes(*state, 1, 4);
+}
+
+static void test_losses_that_do_not_count(void **state) {
+  lose_nodes(*state, 5, 7);
 }
 
 static void test_own_last_life(void **state) {
@@ -406,6 +415,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_limits, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_lease, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_crashes, nodes_setup, nodes_teardown),
+      cmocka_unit_test_setup_teardown(test_losses_that_do_not_count, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_own_last_life, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_needs, nodes_setup, nodes_teardown),
       cmocka_unit_test_setup_teardown(test_begin, nodes_setup, nodes_teardown),
