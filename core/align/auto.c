@@ -2,9 +2,9 @@
  *
  * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
  * (find/match.c), and the composed map goes to the targets of its match. If that gives no good map of two shapes, the
- * next best match is tried. If it gives none of more shapes, pairs of the matches are pinned as landmarks, and the map
- * is composed with the pairs held and then without them. The alignment of least energy is returned. The preset `fast`
- * only searches for rotations of the given spheres.
+ * next best match is tried, and then what fits best in space. If it gives none of more shapes, pairs of the matches are
+ * pinned as landmarks, and the map is composed with the pairs held and then without them. The alignment of least energy
+ * is returned. The preset `fast` only searches for rotations of the given spheres.
  */
 #include <math.h>
 #include <string.h>
@@ -221,6 +221,29 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
   return ORB_OK;
 }
 
+/* If matches have led to no map of two shapes that correspond, what fits best in space may lead to a better one: limbs
+ * that bend the shape much then go where there is room for them. The match then counts as unclear. */
+static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shapes, matches *m,
+                                   const orb_align_options *options, orb_alignment *alignment) {
+  orb_align_options rotated = *options;
+  orb_alignment other;
+  rotated.preset = ORB_PRESET_FAST;
+  if (!m->are_found || alignment->energy <= ORB_FIND_SPACE_ABOVE) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, &other));
+  orb_status status = orb_compose_all(ctx, &other, ORB_MAP_FROM_SPACE, NULL, options->preset);
+  if (status == ORB_OK && other.energy < alignment->energy) {
+    m->clear = 0;
+    m->lead = 1;
+  }
+  if (status == ORB_OK) {
+    orb_alignment_keep_better(ctx, alignment, &other);
+  }
+  orb_alignment_free(ctx, &other);
+  return status;
+}
+
 /* Composes a rotated alignment towards the matches. If that leads to no good map, continues with the next best match of
  * two shapes, or pins pairs of the matches of more. */
 static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, matches *m,
@@ -239,8 +262,10 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   }
   ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, &course, &next), end);
   if (next_is_better(&next, &course)) {
-    status = next_take(ctx, m, poor, &next, alignment);
+    ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
   }
+  next_free(ctx, &next);
+  status = compete_in_space(ctx, shapes, m, options, alignment);
 end:
   next_free(ctx, &next);
   return status;
