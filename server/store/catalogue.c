@@ -369,7 +369,7 @@ store_result catalogue_open_shared(const char *where, int shared, catalogue **ou
     log_error("the catalogue %s cannot be opened: %s", cat->path, sql_reason(code));
   }
   catalogue_close(cat);
-  return catalogue_opened(code, database_is_url(where));
+  return code == SQL_OK ? STORE_ERROR : catalogue_opened(code, database_is_url(where)); /* its thread has not started */
 }
 
 void catalogue_close(catalogue *cat) {
