@@ -159,20 +159,26 @@ static void next_free(orb_context *ctx, next_match *next) {
   memset(next, 0, sizeof *next);
 }
 
+/* The shapes with their spheres rotated onto each other. */
+static orb_status rotate_spheres(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                 const orb_align_options *options, orb_alignment *out) {
+  orb_align_options rotated = *options;
+  rotated.preset = ORB_PRESET_FAST;
+  return orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out);
+}
+
 /* Composes two shapes towards the next best match, unless the best one has led to a good map, or the next one is far
  * behind. A start from targets must beat the start of the best match, which had the same effort; a walk must beat the
  * final map of the best match. */
 static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                             const orb_align_options *options, double energy, const orb_map_course *best,
                             next_match *next) {
-  orb_align_options rotated = *options;
-  rotated.preset = ORB_PRESET_FAST;
   if (m->shape_count != 2 || m->of[1].other_count == 0 || !(energy > ORB_FIND_OTHER_ABOVE) ||
       m->of[1].other[0].cost > ORB_FIND_OTHER_BEHIND) {
     return ORB_OK;
   }
   ORB_TRY(orb_match_other_target(ctx, &m->of[1], 0, &next->target));
-  ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, &next->alignment));
+  ORB_TRY(rotate_spheres(ctx, shapes, m->shape_count, options, &next->alignment));
   next->is_open = 1;
   const double *const targets[2] = {NULL, next->target};
   const orb_aims aims = {.targets = targets,
@@ -225,13 +231,11 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
  * that bend the shape much then go where there is room for them. The match then counts as unclear. */
 static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shapes, matches *m,
                                    const orb_align_options *options, orb_alignment *alignment) {
-  orb_align_options rotated = *options;
   orb_alignment other;
-  rotated.preset = ORB_PRESET_FAST;
   if (!m->are_found || alignment->energy <= ORB_FIND_SPACE_ABOVE) {
     return ORB_OK;
   }
-  ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, &other));
+  ORB_TRY(rotate_spheres(ctx, shapes, m->shape_count, options, &other));
   orb_status status = orb_compose_all(ctx, &other, ORB_MAP_FROM_SPACE, NULL, options->preset);
   if (status == ORB_OK && other.energy < alignment->energy) {
     m->clear = 0;
@@ -396,12 +400,12 @@ end:
 
 /* The same on spheres that keep angles. */
 static orb_status align_even(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                             const orb_align_options *rotated, const orb_align_options *options, orb_alignment *out) {
+                             const orb_align_options *options, orb_alignment *out) {
   orb_even_shapes even;
   orb_status status;
   orb_alignment_free(ctx, out);
   ORB_GO(status, orb_even_shapes_create(ctx, shapes, shape_count, &even), end);
-  ORB_GO(status, orb_align_given(ctx, even.shapes, shape_count, NULL, 0, rotated, out), end);
+  ORB_GO(status, rotate_spheres(ctx, even.shapes, shape_count, options, out), end);
   status = align_rotated(ctx, even.shapes, shape_count, 1, options, out);
 end:
   orb_even_shapes_free(ctx, &even);
@@ -410,15 +414,13 @@ end:
 
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *out) {
-  orb_align_options rotated = *options;
-  rotated.preset = ORB_PRESET_FAST;
-  ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
+  ORB_TRY(rotate_spheres(ctx, shapes, shape_count, options, out));
   orb_status status = ORB_OK;
   int alike = 1;
   if (options->preset != ORB_PRESET_FAST) {
     ORB_GO(status, orb_align_are_alike(ctx, out, options->preset, &alike), end);
     status = alike ? align_rotated(ctx, shapes, shape_count, 0, options, out)
-                   : align_even(ctx, shapes, shape_count, &rotated, options, out);
+                   : align_even(ctx, shapes, shape_count, options, out);
   } else {
     out->match.clear = 1;
   }

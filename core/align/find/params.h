@@ -104,8 +104,7 @@ static const double ORB_FIND_POSED_POOR = 1.8;
  * were, pins had 0.85 to 0.94. */
 static const double ORB_FIND_POSED_BEATEN = 0.95;
 /* No other starts are tried if the pinned map and that of the match differ by this share of the energy at most: where
- * two ways end alike, a third has not been seen to end better. The same share as for two walks (params.walked.agree).
- */
+ * two ways end alike, a third has not been seen to end better. Not varied; the share that two walks had to agree by. */
 static const double ORB_FIND_POSED_AGREE = 0.03;
 
 /* Found landmarks (found.c). */

@@ -128,8 +128,8 @@ typedef struct orb_map_params {
     int32_t few[ORB_MAP_GUIDED_FEW]; /* the same if none of these led to a map: a blade has no room for more */
     double enough;                   /* energy of a coarse map up to which no further walk is tried */
     int beat_most;                   /* most walks where run->beat is known */
-    double agree;                    /* relative difference of two such energies up to which no further one is tried:
-                                        both walks came to one basin */
+    double agree; /* difference of two such energies, relative to what exceeds 1, up to which no further one is tried:
+                     both walks came to one basin */
   } walked;
 
   /* Sweeps over a level. */
