@@ -69,14 +69,17 @@ for _ in $(seq 200); do
   [ "$(ask "http://127.0.0.1:$port$job" | sed 's/.*"stage":"\([^"]*\)".*/\1/')" = embed ] && break
   sleep 0.1
 done
-worker=$(pgrep -P "$zygote")
-for pid in "$daemon" "$worker"; do
+workers=$(pgrep -P "$zygote") # of jobs and of checks
+[ -n "$workers" ]
+for pid in "$daemon" $workers; do
   [ "$(says "$pid" CapEff)" = 0000000000000000 ] && [ "$(says "$pid" CapBnd)" = 0000000000000000 ]
   [ "$(says "$pid" NoNewPrivs)" = 1 ] && [ "$(says "$pid" Seccomp)" = 2 ]
   [ "$(says "$pid" Uid | cut -f1)" = "$owner" ]
 done
-# The job's process has its own filter in addition to the container's.
-[ "$(says "$worker" Seccomp_filters)" -gt "$(says "$daemon" Seccomp_filters)" ]
+# These processes have their own filter in addition to the container's.
+for pid in $workers; do
+  [ "$(says "$pid" Seccomp_filters)" -gt "$(says "$daemon" Seccomp_filters)" ]
+done
 ask -X DELETE "http://127.0.0.1:$port$job" >/dev/null
 "${run[@]}" exec "$name" curl -fsS "http://127.0.0.1:$port/livez" >/dev/null
 "${run[@]}" stop -t 20 "$name" >/dev/null
