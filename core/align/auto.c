@@ -9,6 +9,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/contest.h"
 #include "align/find/match.h"
 #include "align/find/params.h"
 #include "align/map/engine/params.h"
@@ -75,7 +76,6 @@ static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, 
   }
   for (int32_t s = 1; s < shape_count; s++) {
     ORB_TRY(orb_match_find(ctx, shapes[0].mesh, shapes[s].mesh, NULL, &m->of[s]));
-    m->targets[s] = m->of[s].target;
     m->are_found = m->are_found && m->of[s].is_found;
     m->clear = fmin(m->clear, m->of[s].clear);
     m->lead = fmin(m->lead, m->of[s].lead);
@@ -194,15 +194,10 @@ static int next_is_better(const next_match *next, const orb_map_course *best) {
   return next->is_open && !next->course.is_beaten && next->course.bulk - 1 < ORB_FIND_OTHER_GAIN * (best->bulk - 1);
 }
 
-/* Makes the next best match the match. The best match can be wrong although it bends less, since a twisted body can
- * bend less when its limbs are swapped; then only the map shows the mistake. Since bend and map disagree, the match
- * counts as unclear. */
-static orb_status next_take(orb_context *ctx, matches *m, double poor, next_match *next, orb_alignment *alignment) {
-  const double clear = fmax(0, 1 - next->alignment.energy / fmin(alignment->energy, poor));
-  double *target = next->target;
-  orb_alignment_free(ctx, alignment);
-  *alignment = next->alignment;
-  memset(next, 0, sizeof *next);
+/* Makes the next best match the match; takes over its target. The best match can be wrong although it bends less, since
+ * a twisted body can bend less when its limbs are swapped; then only the map shows the mistake. Since bend and map
+ * disagree, the match counts as unclear. */
+static orb_status choose_next(orb_context *ctx, matches *m, double *target, double clear) {
   ORB_TRY(orb_match_choose(ctx, &m->of[1], 0, target, clear));
   m->targets[1] = m->of[1].target;
   m->clear = m->of[1].clear;
@@ -210,6 +205,16 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
   m->bend = m->of[1].bend;
   gather(m);
   return ORB_OK;
+}
+
+/* Replaces the map of the best match by that of the next best one. */
+static orb_status next_take(orb_context *ctx, matches *m, double poor, next_match *next, orb_alignment *alignment) {
+  const double clear = fmax(0, 1 - next->alignment.energy / fmin(alignment->energy, poor));
+  double *target = next->target;
+  orb_alignment_free(ctx, alignment);
+  *alignment = next->alignment;
+  memset(next, 0, sizeof *next);
+  return choose_next(ctx, m, target, clear);
 }
 
 /* If a match has led to no map, its pairs are pinned. */
@@ -248,14 +253,37 @@ static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shap
   return status;
 }
 
+/* Composes two shapes that bend much towards the better of their two best matches. */
+static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_options *options,
+                               orb_alignment *alignment) {
+  double *target, clear = 0;
+  ORB_TRY(orb_contest_run(ctx, &m->of[1], options->preset, alignment, &target, &clear));
+  m->targets[1] = m->of[1].target;
+  return target ? choose_next(ctx, m, target, clear) : ORB_OK;
+}
+
+/* Computes the targets of all matches. */
+static orb_status aim(orb_context *ctx, matches *m) {
+  for (int32_t s = 1; s < m->shape_count; s++) {
+    ORB_TRY(orb_match_aim(ctx, &m->of[s]));
+    m->targets[s] = m->of[s].target;
+  }
+  return ORB_OK;
+}
+
 /* Composes a rotated alignment towards the matches. If that leads to no good map, continues with the next best match of
  * two shapes, or pins pairs of the matches of more. */
 static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, matches *m,
                                  const orb_align_options *options, orb_alignment *alignment) {
   const double poor = orb_map_params_of(options->preset).energy.poor;
+  if (m->shape_count == 2 && orb_contest_is_open(&m->of[1], m->keep_angles)) {
+    ORB_TRY(hold_contest(ctx, m, options, alignment));
+    return compete_in_space(ctx, shapes, m, options, alignment);
+  }
   next_match next = {0};
   orb_status status;
   orb_map_course course = {0};
+  ORB_TRY(aim(ctx, m));
   const orb_aims aims = {.targets = m->targets,
                          .keep_angles = m->keep_angles,
                          .course = m->shape_count == 2 ? &course : NULL, /* only pairs have a next match */

@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/hash.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/state.h"
 
@@ -23,6 +24,19 @@ static int default_threads(void) {
   return online < 1 ? 1 : online > MAX_THREADS ? MAX_THREADS : (int)online;
 }
 
+static void begin(orb_context *ctx, orb_context *root, const orb_context_options *options) {
+  memset(ctx, 0, offsetof(orb_context, error)); /* what follows is set below: the error takes 300 KB */
+  ctx->in_loop = 0;
+  ctx->stage = NULL;
+  ctx->pool = NULL;
+  ctx->magic = CONTEXT_MAGIC;
+  ctx->root = root;
+  ctx->options = *options;
+  orb_error_reset(&ctx->error);
+  pthread_mutex_init(&ctx->error_lock, NULL);
+  pthread_mutex_init(&ctx->progress_lock, NULL);
+}
+
 orb_status orb_context_create(const orb_context_options *options, orb_context **out) {
   static const orb_context_options defaults = {0};
   if (!options) {
@@ -33,12 +47,7 @@ orb_status orb_context_create(const orb_context_options *options, orb_context **
   if (!ctx) {
     return ORB_E_NO_MEMORY;
   }
-  memset(ctx, 0, offsetof(orb_context, error)); /* what follows is set below: the error takes 300 KB */
-  ctx->in_loop = 0;
-  ctx->stage = NULL;
-  ctx->pool = NULL;
-  ctx->magic = CONTEXT_MAGIC;
-  ctx->options = *options;
+  begin(ctx, ctx, options);
   if (ctx->options.max_triangles == 0) {
     ctx->options.max_triangles = DEFAULT_MAX_TRIANGLES;
   }
@@ -49,10 +58,19 @@ orb_status orb_context_create(const orb_context_options *options, orb_context **
     ctx->options.threads = MAX_THREADS;
   }
   orb_hash_key(ctx->hash_key);
-  orb_error_reset(&ctx->error);
-  pthread_mutex_init(&ctx->error_lock, NULL);
-  pthread_mutex_init(&ctx->progress_lock, NULL);
   *out = ctx;
+  return ORB_OK;
+}
+
+orb_status orb_context_part(orb_context *ctx, int threads, orb_context **out) {
+  orb_context *part = orb_alloc(ctx, 1, sizeof *part);
+  if (!part) {
+    return ORB_E_NO_MEMORY;
+  }
+  begin(part, ctx->root, &ctx->root->options);
+  part->options.threads = threads;
+  memcpy(part->hash_key, ctx->hash_key, sizeof part->hash_key);
+  *out = part;
   return ORB_OK;
 }
 
@@ -66,7 +84,9 @@ void orb_context_destroy(orb_context *ctx) {
   pthread_mutex_destroy(&ctx->error_lock);
   pthread_mutex_destroy(&ctx->progress_lock);
   ctx->magic = 0;
-  if (ctx->options.allocator.free) {
+  if (ctx->root != ctx) {
+    orb_free(ctx->root, ctx);
+  } else if (ctx->options.allocator.free) {
     ctx->options.allocator.free(ctx->options.allocator.user, ctx);
   } else {
     free(ctx);
@@ -74,11 +94,11 @@ void orb_context_destroy(orb_context *ctx) {
 }
 
 void orb_context_cancel(orb_context *ctx) {
-  atomic_store(&ctx->cancelled, 1);
+  atomic_store(&ctx->root->cancelled, 1);
 }
 
 orb_status orb_context_check(orb_context *ctx) {
-  if (atomic_load_explicit(&ctx->cancelled, memory_order_relaxed)) {
+  if (atomic_load_explicit(&ctx->root->cancelled, memory_order_relaxed)) {
     return orb_fail(ctx, ORB_E_CANCELLED, "The job was cancelled.");
   }
   if (ctx->options.deadline_ms && orb_clock_ms() > ctx->options.deadline_ms) {
@@ -87,7 +107,8 @@ orb_status orb_context_check(orb_context *ctx) {
   return ORB_OK;
 }
 
-void orb_progress(orb_context *ctx, const char *stage, double fraction) {
+void orb_progress(orb_context *part, const char *stage, double fraction) {
+  orb_context *ctx = part->root;
   if (!ctx->options.progress || pthread_mutex_trylock(&ctx->progress_lock) != 0) {
     return;
   }
@@ -97,7 +118,8 @@ void orb_progress(orb_context *ctx, const char *stage, double fraction) {
   pthread_mutex_unlock(&ctx->progress_lock);
 }
 
-const char *orb_progress_only(orb_context *ctx, const char *stage) {
+const char *orb_progress_only(orb_context *part, const char *stage) {
+  orb_context *ctx = part->root;
   pthread_mutex_lock(&ctx->progress_lock);
   const char *before = ctx->stage;
   ctx->stage = stage;
@@ -125,7 +147,7 @@ orb_cpu orb_context_cpu(const orb_context *ctx) {
 }
 
 int orb_threads(const orb_context *ctx) {
-  return ctx->options.threads;
+  return ctx->root->options.threads;
 }
 int64_t orb_context_max_triangles(const orb_context *ctx) {
   return ctx->options.max_triangles;

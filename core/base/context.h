@@ -1,7 +1,7 @@
 /* Limits of a context that only core reads.
  *
  * core/base: state.h (the struct of a context), context.c (its life, cancelling, progress), error.c, memory.c,
- * buffer.c, parallel.c (threads), loops.h (loops that check for cancellation), check.h (invariants), grow.h, hash.c,
+ * buffer.c, parallel.c (threads), tasks.h (work side by side), loops.h (loops that check for cancellation), check.h (invariants), grow.h, hash.c,
  * clock.c, printf.h (checks of formats), status.c, version.c.
  */
 #ifndef ORB_BASE_CONTEXT_H
@@ -10,6 +10,11 @@
 #include "orbmorph/context.h"
 
 int64_t orb_context_max_triangles(const orb_context *ctx);
+
+/* A part of a context for a task that runs beside others (tasks.h): it has an error record and threads of its own, and
+ * the budget, cancel flag, deadline and progress of ctx. What is allocated from the one may be freed from the other.
+ * Destroy it before ctx. orb_threads() of it is that of ctx. */
+ORB_MUST_CHECK orb_status orb_context_part(orb_context *ctx, int threads, orb_context **out);
 
 /* Reports progress. Any thread; reports that collide with another are dropped. */
 void orb_progress(orb_context *ctx, const char *stage, double fraction);

@@ -61,13 +61,13 @@ static void *out_of_memory(orb_context *ctx, size_t wanted, int budget) {
 }
 
 static int charge(orb_context *ctx, size_t total) {
-  size_t used = atomic_fetch_add(&ctx->memory_used, total) + total;
+  size_t used = atomic_fetch_add(&ctx->root->memory_used, total) + total;
   if (ctx->options.memory_limit && used > ctx->options.memory_limit) {
-    atomic_fetch_sub(&ctx->memory_used, total);
+    atomic_fetch_sub(&ctx->root->memory_used, total);
     return 0;
   }
-  size_t peak = atomic_load(&ctx->memory_peak);
-  while (used > peak && !atomic_compare_exchange_weak(&ctx->memory_peak, &peak, used)) {
+  size_t peak = atomic_load(&ctx->root->memory_peak);
+  while (used > peak && !atomic_compare_exchange_weak(&ctx->root->memory_peak, &peak, used)) {
   }
   return 1;
 }
@@ -137,7 +137,7 @@ void *orb_alloc(orb_context *ctx, size_t count, size_t size) {
   int mapped = maps(ctx, total);
   void *raw = get_raw(ctx, total, mapped);
   if (!raw) {
-    atomic_fetch_sub(&ctx->memory_used, total);
+    atomic_fetch_sub(&ctx->root->memory_used, total);
     return out_of_memory(ctx, total, 0);
   }
   uintptr_t start = ((uintptr_t)raw + 2 * ALIGNMENT - 1) & ~(uintptr_t)(ALIGNMENT - 1);
@@ -165,12 +165,12 @@ static void *remap(orb_context *ctx, void *block, size_t total, size_t bytes) {
   char *raw = mremap(header->raw, old, total, MREMAP_MAYMOVE);
   if (raw == MAP_FAILED) {
     if (total > old) {
-      atomic_fetch_sub(&ctx->memory_used, total - old);
+      atomic_fetch_sub(&ctx->root->memory_used, total - old);
     }
     return out_of_memory(ctx, total, 0);
   }
   if (total < old) {
-    atomic_fetch_sub(&ctx->memory_used, old - total);
+    atomic_fetch_sub(&ctx->root->memory_used, old - total);
   }
   block = raw + offset;
   header = header_of(block);
@@ -205,7 +205,7 @@ void orb_free(orb_context *ctx, void *block) {
   ORB_ASSERT(header->magic == BLOCK_MAGIC);
   header->magic = FREED_MAGIC;
   size_t total = header->total;
-  atomic_fetch_sub(&ctx->memory_used, total);
+  atomic_fetch_sub(&ctx->root->memory_used, total);
   void *raw = header->raw;
 #ifdef ORB_MAPS
   if (header->mapped) {
@@ -221,8 +221,8 @@ void orb_free(orb_context *ctx, void *block) {
 }
 
 size_t orb_memory_used(const orb_context *ctx) {
-  return atomic_load(&ctx->memory_used);
+  return atomic_load(&ctx->root->memory_used);
 }
 size_t orb_memory_peak(const orb_context *ctx) {
-  return atomic_load(&ctx->memory_peak);
+  return atomic_load(&ctx->root->memory_peak);
 }

@@ -348,7 +348,9 @@ static void run_shared(struct orb_pool *pool, const parallel_loop *loop, uint32_
   }
 }
 
-void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
+/* always: shares the loop whatever it took before. */
+static void run_loop(orb_context *ctx, int64_t start, int64_t count, int64_t grain, orb_loop_fn body, void *arg,
+                     int always) {
   ORB_ASSERT(grain >= 1 && count / grain < UINT32_MAX - 1);
   struct orb_pool *pool = ctx->pool;
   parallel_loop loop = {.body = body, .arg = arg, .start = start, .count = count, .grain = grain};
@@ -363,13 +365,21 @@ void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t 
   ctx->in_loop = 1;
   loop_cost *cost = cost_of(pool, body);
   uint32_t done = 0;
-  if (cost->seconds > 0 && !is_worth_sharing(pool, cost->seconds * (double)count)) {
+  if (!always && cost->seconds > 0 && !is_worth_sharing(pool, cost->seconds * (double)count)) {
     done = begin_alone(pool, &loop, cost);
   }
   if (done < loop.chunks) {
     run_shared(pool, &loop, done, cost);
   }
   ctx->in_loop = 0;
+}
+
+void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
+  run_loop(ctx, start, count, grain, body, arg, 0);
+}
+
+void orb_parallel_each(orb_context *ctx, int64_t count, orb_loop_fn body, void *arg) {
+  run_loop(ctx, 0, count, 1, body, arg, 1);
 }
 
 void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {

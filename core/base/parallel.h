@@ -15,6 +15,9 @@ void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_f
 /* The same over [start, start + count): chunks begin at start and at multiples of grain from there. */
 void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
 
+/* The same over [0, count) in chunks of one, each of which is worth a thread. */
+void orb_parallel_each(orb_context *ctx, int64_t count, orb_loop_fn body, void *arg);
+
 /* Joins the threads and frees the pool. Does nothing where no parallel loop has run. */
 void orb_pool_stop(orb_context *ctx);
 

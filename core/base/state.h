@@ -9,6 +9,7 @@
 
 struct orb_context {
   uint32_t magic;
+  orb_context *root; /* itself, or the context of which this one is a part: it has budget, cancel flag and progress */
   orb_context_options options;
   atomic_int cancelled;
   atomic_size_t memory_used, memory_peak; /* bytes */

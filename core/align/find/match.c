@@ -77,7 +77,7 @@ static orb_status write_ranking(const orb_trials *t, orb_match *out) {
 /* Registers a trial's second copy again with the landmarks as anchors. Until here landmarks only excluded maps, since
  * anchors would draw a wrong map to their partners as well. If the anchors bend the copy far more than before, they
  * have twisted a limb or the waist; then the pose without them stays until it settles. */
-static orb_status draw_to_landmarks(const orb_trials *t, orb_trial *one) {
+static orb_status draw_to_landmarks(orb_context *ctx, const orb_trials *t, orb_trial *one) {
   const orb_mesh *copy = &t->copy[1].mesh;
   orb_elastic_anchor *anchors = NULL;
   orb_elastic_pose drawn = {NULL, NULL};
@@ -86,60 +86,54 @@ static orb_status draw_to_landmarks(const orb_trials *t, orb_trial *one) {
   if (t->hint.count == 0) {
     return ORB_OK;
   }
-  ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, copy, &anchors), end);
-  ORB_GO(status, orb_trial_pose_create(t->ctx, copy, &drawn), end);
+  ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, copy, &anchors), end);
+  ORB_GO(status, orb_trial_pose_create(ctx, copy, &drawn), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};
-  ORB_GO(status, orb_elastic_register(t->ctx, copy, &t->copy[0].mesh, &one->map[1], &held, &drawn, &bend), end);
+  ORB_GO(status, orb_elastic_register(ctx, copy, &t->copy[0].mesh, &one->map[1], &held, &drawn, &bend), end);
   if (bend <= ORB_FIND_DRAWN_BEND * one->bend[1]) {
     const orb_elastic_pose before = one->pose[1];
     one->pose[1] = drawn;
     drawn = before;
   }
 end:
-  orb_trial_pose_free(t->ctx, &drawn);
-  orb_free(t->ctx, anchors);
+  orb_trial_pose_free(ctx, &drawn);
+  orb_free(ctx, anchors);
   return status;
 }
 
-/* Settles a finer copy of the second shape on one of the first, and carries its pose to all vertices. */
-static orb_status write_targets(const orb_trials *t, orb_trial *one, double **target) {
-  orb_coarse_copy fine[2] = {{{0}, NULL, NULL}, {{0}, NULL, NULL}};
+/* Settles the fine copy of the second shape on that of the first, and carries its pose to all vertices. */
+static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial *one, double **target) {
+  const orb_coarse_copy *fine = t->fine;
   orb_elastic_pose pose = {NULL, NULL}, all = {NULL, NULL};
   orb_elastic_anchor *anchors = NULL;
   size_t count = 3 * (size_t)t->mesh[1]->vertex_count;
-  double *points = ORB_NEW(t->ctx, double, count);
+  double *points = ORB_NEW(ctx, double, count);
   orb_status status = ORB_E_NO_MEMORY;
-  all.position = *target = ORB_NEW(t->ctx, double, count);
+  all.position = *target = ORB_NEW(ctx, double, count);
   if (!points || !all.position) {
     goto end;
   }
-  for (int s = 0; s < 2; s++) {
-    ORB_GO(status, orb_trials_copy(t, s, ORB_FIND_FINE, &fine[s]), end);
-  }
-  ORB_GO(status, orb_trial_pose_create(t->ctx, &fine[1].mesh, &pose), end);
-  ORB_GO(status, draw_to_landmarks(t, one), end);
+  ORB_GO(status, orb_trial_pose_create(ctx, &fine[1].mesh, &pose), end);
+  ORB_GO(status, draw_to_landmarks(ctx, t, one), end);
   ORB_GO(status,
-         orb_elastic_carry(t->ctx, &t->copy[1].mesh, &one->pose[1], fine[1].mesh.positions, fine[1].mesh.vertex_count,
+         orb_elastic_carry(ctx, &t->copy[1].mesh, &one->pose[1], fine[1].mesh.positions, fine[1].mesh.vertex_count,
                            &pose),
          end);
-  ORB_GO(status, orb_hint_anchors_create(t->ctx, &t->hint, &fine[1].mesh, &anchors), end);
+  ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, &fine[1].mesh, &anchors), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};
   const int rounds = (one->bend[0] + one->bend[1]) / 2 > ORB_FIND_WALKS_FIRST ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
-  ORB_GO(status, orb_elastic_settle(t->ctx, &fine[1].mesh, &fine[0].mesh, &held, rounds, &pose), end);
+  ORB_GO(status, orb_elastic_settle(ctx, &fine[1].mesh, &fine[0].mesh, &held, rounds, &pose), end);
   for (size_t i = 0; i < count; i++) {
     points[i] = (t->mesh[1]->positions[i] - t->scaling[1].middle[i % 3]) * t->scaling[1].scale;
   }
-  ORB_GO(status, orb_elastic_carry(t->ctx, &fine[1].mesh, &pose, points, t->mesh[1]->vertex_count, &all), end);
+  ORB_GO(status, orb_elastic_carry(ctx, &fine[1].mesh, &pose, points, t->mesh[1]->vertex_count, &all), end);
   for (size_t i = 0; i < count; i++) {
     all.position[i] = all.position[i] / t->scaling[0].scale + t->scaling[0].middle[i % 3];
   }
 end:
-  orb_free(t->ctx, points);
-  orb_free(t->ctx, anchors);
-  orb_trial_pose_free(t->ctx, &pose);
-  for (int s = 0; s < 2; s++) {
-    orb_coarse_copy_free(t->ctx, &fine[s]);
-  }
+  orb_free(ctx, points);
+  orb_free(ctx, anchors);
+  orb_trial_pose_free(ctx, &pose);
   return status;
 }
 
@@ -196,7 +190,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->is_found = 1;
   orb_trials_list(t);
   ORB_TRY(write_ranking(t, out));
-  return write_targets(t, &t->trial[best], &out->target);
+  return orb_trials_refine(t);
 }
 
 orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
@@ -206,15 +200,20 @@ orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mes
   return out->trials ? run(ctx, first, second, hint, out) : ORB_E_NO_MEMORY;
 }
 
+orb_status orb_match_aim(orb_context *ctx, orb_match *match) {
+  orb_trials *t = match->trials;
+  return match->is_found && !match->target ? write_targets(ctx, t, &t->trial[t->list[0]], &match->target) : ORB_OK;
+}
+
 orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target) {
   orb_trials *t = match->trials;
   orb_trial *one = &t->trial[t->list[1 + k]];
-  ORB_ASSERT(k < match->other_count && t->ctx == ctx);
+  ORB_ASSERT(k < match->other_count);
   *target = NULL;
   if (!(one->cost < INFINITY)) { /* it was dropped before its way back was registered */
-    ORB_TRY(orb_trials_complete(t, t->list[1 + k]));
+    ORB_TRY(orb_trials_complete(ctx, t, t->list[1 + k]));
   }
-  return write_targets(t, one, target);
+  return write_targets(ctx, t, one, target);
 }
 
 orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear) {

@@ -15,7 +15,9 @@
  * limbs bends the copies least, even if it is off at their tips. A twin (left and right swapped with front and back)
  * bends them more, and often also rotates them in space.
  *
- * Rejected: ranking candidates by the energy of their composed maps on the coarse copies. That energy depends on the
+ * Where shapes bend much, neither is sure, and the walks towards the two best matches decide (align/contest.h).
+ *
+ * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on the
  * course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by no
  * more than that. */
 #ifndef ORB_ALIGN_FIND_MATCH_H
@@ -52,16 +54,20 @@ typedef struct orb_match {
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  double *target;     /* where each vertex of the second shape lies on the first one, in its space: 3 per vertex */
-  orb_trials *trials; /* the candidates, for the two functions below */
+  double *target;     /* where each vertex of the second shape lies on the first one, in its space: 3 per vertex; NULL
+                         before orb_match_aim() */
+  orb_trials *trials; /* the candidates, for the functions below */
 } orb_match;
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
  * poses. Only maps that take the first few landmarks near their partners count; the targets then take all landmarks
- * there. Free `out` in any case. About 0.6 s of one thread, whatever the size. Trials run on all threads, and the
+ * there. Free `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on all threads, and the
  * result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
+/* Computes the target of the best map, if there is one and it is not there. About 0.1 s of one thread. It may run beside
+ * orb_match_other_target(). */
+ORB_MUST_CHECK orb_status orb_match_aim(orb_context *ctx, orb_match *match);
 /* Computes the target of other[k], which the caller frees, also on failure. The meshes of the match must still exist.
  * About 0.2 s of one thread. */
 ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);

@@ -10,6 +10,7 @@
 #include "base/context.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/tasks.h"
 #include "elastic/elastic.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
@@ -24,23 +25,35 @@ static void scaling_of(const orb_mesh *mesh, orb_trial_scaling *out) {
   }
 }
 
-orb_status orb_trials_copy(const orb_trials *t, int s, int32_t size, orb_coarse_copy *out) {
-  ORB_TRY(orb_coarse_copy_create(t->ctx, t->mesh[s], size, out));
+/* A decimated copy of shape s, scaled like it. */
+static orb_status make_copy(orb_context *ctx, const orb_trials *t, int s, int32_t size, orb_coarse_copy *out) {
+  ORB_TRY(orb_coarse_copy_create(ctx, t->mesh[s], size, out));
   for (size_t i = 0; i < 3 * (size_t)out->mesh.vertex_count; i++) {
     out->mesh.positions[i] = (out->mesh.positions[i] - t->scaling[s].middle[i % 3]) * t->scaling[s].scale;
   }
   return ORB_OK;
 }
 
+static orb_status make_coarse(orb_context *ctx, void *arg, int32_t s) {
+  orb_trials *t = arg;
+  scaling_of(t->mesh[s], &t->scaling[s]);
+  return make_copy(ctx, t, s, ORB_FIND_COARSE, &t->copy[s]);
+}
+
 orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, orb_trials *t) {
   t->ctx = ctx;
   t->mesh[0] = first;
   t->mesh[1] = second;
-  for (int s = 0; s < 2; s++) {
-    scaling_of(t->mesh[s], &t->scaling[s]);
-    ORB_TRY(orb_trials_copy(t, s, ORB_FIND_COARSE, &t->copy[s]));
-  }
-  return ORB_OK;
+  return orb_tasks_run(ctx, 2, make_coarse, t);
+}
+
+static orb_status make_fine(orb_context *ctx, void *arg, int32_t s) {
+  orb_trials *t = arg;
+  return make_copy(ctx, t, s, ORB_FIND_FINE, &t->fine[s]);
+}
+
+orb_status orb_trials_refine(orb_trials *t) {
+  return t->fine[0].mesh.vertex_count > 0 ? ORB_OK : orb_tasks_run(t->ctx, 2, make_fine, t);
 }
 
 void orb_trial_pose_free(orb_context *ctx, orb_elastic_pose *pose) {
@@ -316,11 +329,11 @@ void orb_trials_list(orb_trials *t) {
   }
 }
 
-orb_status orb_trials_complete(orb_trials *t, int32_t number) {
-  t->task[0] = 2 * number + 1;
-  register_tasks(t, 0, 1, 0);
-  ORB_TRY(t->status[0]);
-  fill_cost(t, &t->trial[number], 2);
+orb_status orb_trials_complete(orb_context *ctx, orb_trials *t, int32_t number) {
+  orb_trial *one = &t->trial[number];
+  ORB_TRY(orb_elastic_register(ctx, &t->copy[1].mesh, &t->copy[0].mesh, &one->map[1], NULL, &one->pose[1],
+                               &one->bend[1]));
+  fill_cost(t, one, 2);
   return ORB_OK;
 }
 
@@ -331,6 +344,7 @@ void orb_trials_close(orb_trials *t) {
   }
   for (int s = 0; s < 2; s++) {
     orb_coarse_copy_free(t->ctx, &t->copy[s]);
+    orb_coarse_copy_free(t->ctx, &t->fine[s]);
     orb_free(t->ctx, t->rotated[s]);
   }
   orb_hint_places_free(t->ctx, &t->hint);

@@ -34,6 +34,7 @@ typedef struct orb_trials {
   const orb_mesh *mesh[2]; /* borrowed */
   orb_trial_scaling scaling[2];
   orb_coarse_copy copy[2]; /* scaled */
+  orb_coarse_copy fine[2]; /* the same with ORB_FIND_FINE vertices, on which matches are settled; empty until needed */
   orb_hint_places hint;    /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
   orb_spectral_dense dense;
   int32_t *rotated[2]; /* the maps of the rotations, one after the other, laid out as in `dense` */
@@ -51,8 +52,8 @@ ORB_MUST_CHECK orb_status orb_trials_open(orb_context *ctx, const orb_mesh *firs
                                           orb_trials *trials);
 void orb_trials_close(orb_trials *trials);
 
-/* A decimated copy of shape s, scaled like it. The caller frees it. */
-ORB_MUST_CHECK orb_status orb_trials_copy(const orb_trials *trials, int s, int32_t size, orb_coarse_copy *out);
+/* Makes the fine copies, unless they are there. */
+ORB_MUST_CHECK orb_status orb_trials_refine(orb_trials *trials);
 
 /* Makes the trials: spectral maps and rotations of the spheres. */
 ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);
@@ -71,7 +72,7 @@ int32_t orb_trials_best(const orb_trials *trials);
 void orb_trials_list(orb_trials *trials);
 
 /* Registers trial `number` in the second direction, and sets its cost by both. */
-ORB_MUST_CHECK orb_status orb_trials_complete(orb_trials *trials, int32_t number);
+ORB_MUST_CHECK orb_status orb_trials_complete(orb_context *ctx, orb_trials *trials, int32_t number);
 
 /* Room for a pose of a mesh; free it in any case. */
 ORB_MUST_CHECK orb_status orb_trial_pose_create(orb_context *ctx, const orb_mesh *mesh, orb_elastic_pose *out);

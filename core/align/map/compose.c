@@ -317,66 +317,85 @@ done:
   return status;
 }
 
+/* A run of these two shapes. */
+static orb_map_run run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
+                          int32_t landmark_count, const orb_map_guide *guide, orb_preset preset) {
+  const orb_map_params params = orb_map_params_of(preset);
+  return (orb_map_run){.ctx = ctx,
+                       .params = params,
+                       .fixed = fixed,
+                       .moving = moving,
+                       .both = both,
+                       .landmark_count = landmark_count,
+                       .given_target = guide->target,
+                       .keeps_angles = guide->keeps_angles,
+                       .beat = guide->beat,
+                       .rival = guide->rival,
+                       .wants_course = guide->course != NULL,
+                       .walks_first = guide->walks_first && both,
+                       .springs = guide->springs,
+                       .hopeless_flips = params.clear.hopeless,
+                       .passes = params.work.passes,
+                       .work = params.work.all * (int64_t)moving->mesh.vertex_count,
+                       .hopeless = INFINITY,
+                       .settled = INFINITY,
+                       .twisted_energy = INFINITY};
+}
+
+/* Measures the map as given and finds the pairs. energy: as of orb_compose(), both of the map as given. */
+static orb_status open_run(orb_map_run *c, const orb_map_guide *guide, double energy[2]) {
+  const orb_aligned_shape *moving = c->moving;
+  ORB_TRY(prepare(c));
+  energy[0] = INFINITY;
+  if (guide->from != ORB_MAP_FROM_COPY) {
+    ORB_TRY(orb_map_energy_of(c, moving->points, c->params.energy.cap, &energy[0]));
+  }
+  memcpy(c->best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c->best);
+  c->best_energy = energy[0];
+  ORB_TRY(orb_map_pairs_create(c));
+  if ((guide->target && c->pairs.landmarks > 0) /* the landmarks are apart */ || guide->from == ORB_MAP_FROM_SPRINGS) {
+    energy[0] = c->best_energy = INFINITY;
+  }
+  energy[1] = energy[0];
+  return ORB_OK;
+}
+
+/* Starts, then untwists limbs and slides where that may help. before: the energy of the map as given. */
+static orb_status start_and_finish(orb_map_run *c, orb_map_from from, orb_preset preset, double before) {
+  ORB_TRY(run(c, from, preset));
+  const int is_hopeless = c->course.is_beaten || (c->given_target && c->best_energy > c->params.targets.hopeless);
+  if (!is_hopeless && (from != ORB_MAP_FROM_WALK || c->best_energy < before)) {
+    ORB_TRY(orb_map_untwist(c, INFINITY));
+    if (should_slide(c, from)) {
+      ORB_TRY(orb_map_slide(c, before));
+    }
+  }
+  return ORB_OK;
+}
+
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                        int32_t landmark_count, const orb_map_guide *guide, orb_preset preset, double energy[2],
                        int *improved) {
-  orb_map_run c = {.ctx = ctx,
-                   .params = orb_map_params_of(preset),
-                   .both = both,
-                   .landmark_count = landmark_count,
-                   .given_target = guide->target,
-                   .keeps_angles = guide->keeps_angles,
-                   .beat = guide->beat,
-                   .rival = guide->rival,
-                   .wants_course = guide->course != NULL,
-                   .walks_first = guide->walks_first && both,
-                   .springs = guide->springs,
-                   .hopeless = INFINITY,
-                   .settled = INFINITY,
-                   .twisted_energy = INFINITY};
+  const orb_map_params params = orb_map_params_of(preset);
   int swap = 0;
   *improved = 0;
-  if (both && !guide->target && fixed->mesh.vertex_count <= c.params.copies.large) {
-    ORB_TRY(orb_map_should_swap(ctx, &c.params, fixed, moving, &swap));
+  if (both && !guide->target && fixed->mesh.vertex_count <= params.copies.large) {
+    ORB_TRY(orb_map_should_swap(ctx, &params, fixed, moving, &swap));
   }
   if (swap) {
     orb_aligned_shape *other = fixed;
     fixed = moving;
     moving = other;
   }
-  c.fixed = fixed;
-  c.moving = moving;
-  c.hopeless_flips = c.params.clear.hopeless;
-  c.passes = c.params.work.passes;
-  c.work = c.params.work.all * (int64_t)moving->mesh.vertex_count;
+  orb_map_run c = run_of(ctx, fixed, moving, both, landmark_count, guide, preset);
   orb_status status;
-  ORB_GO(status, prepare(&c), done);
-  energy[0] = INFINITY;
-  if (guide->from != ORB_MAP_FROM_COPY) {
-    ORB_GO(status, orb_map_energy_of(&c, moving->points, c.params.energy.cap, &energy[0]), done);
-  }
-  energy[1] = c.best_energy = energy[0];
-  memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
-  ORB_GO(status, orb_map_pairs_create(&c), done);
-  if (guide->target && c.pairs.landmarks > 0) {
-    energy[0] = energy[1] = c.best_energy = INFINITY; /* the landmarks are apart */
-  }
-  if (guide->from == ORB_MAP_FROM_SPRINGS) {
-    energy[0] = energy[1] = c.best_energy = INFINITY;
-  }
+  ORB_GO(status, open_run(&c, guide, energy), done);
   if (guide->from == ORB_MAP_FROM_PINS || guide->from == ORB_MAP_FROM_SPRINGS) {
     ORB_GO(status, let_go(&c), done);
   } else if (guide->from == ORB_MAP_FROM_COPY) {
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
   } else {
-    ORB_GO(status, run(&c, guide->from, preset), done);
-    const int is_hopeless = c.course.is_beaten || (c.given_target && c.best_energy > c.params.targets.hopeless);
-    if (!is_hopeless && (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0])) {
-      ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
-      if (should_slide(&c, guide->from)) {
-        ORB_GO(status, orb_map_slide(&c, energy[0]), done);
-      }
-    }
+    ORB_GO(status, start_and_finish(&c, guide->from, preset, energy[0]), done);
   }
   if (guide->course) {
     ORB_GO(status, orb_map_energy_of(&c, c.best, c.params.energy.bulk, &c.course.bulk), done);
@@ -386,4 +405,47 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
 done:
   orb_map_run_free(&c);
   return status;
+}
+
+struct orb_draft {
+  orb_map_run run;
+  orb_map_walked walked;
+  orb_aligned_shape *fixed;
+  orb_preset preset;
+  double energy[2]; /* as of orb_compose() */
+};
+
+orb_status orb_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, const double *target,
+                            int keeps_angles, orb_preset preset, orb_draft **out, double *energy) {
+  const orb_map_guide guide = {.target = target, .keeps_angles = keeps_angles, .walks_first = 1};
+  orb_draft *d = *out = ORB_NEW0(ctx, orb_draft, 1);
+  if (!d) {
+    return ORB_E_NO_MEMORY;
+  }
+  d->run = run_of(ctx, fixed, moving, 1, 0, &guide, preset);
+  d->fixed = fixed;
+  d->preset = preset;
+  ORB_TRY(open_run(&d->run, &guide, d->energy));
+  ORB_TRY(orb_map_draft_walks(&d->run, &d->walked));
+  *energy = d->walked.energy;
+  return ORB_OK;
+}
+
+orb_status orb_draft_finish(orb_context *ctx, orb_draft *d, double *energy) {
+  int improved = 0;
+  d->run.ctx = ctx;
+  d->run.drafted = &d->walked;
+  ORB_TRY(start_and_finish(&d->run, ORB_MAP_FROM_SPACE, d->preset, d->energy[0]));
+  ORB_TRY(take_best(&d->run, d->fixed, d->energy, &improved));
+  *energy = d->energy[1];
+  return ORB_OK;
+}
+
+void orb_draft_free(orb_context *ctx, orb_draft *d) {
+  if (d) {
+    d->run.ctx = ctx;
+    orb_map_walked_free(&d->run, &d->walked);
+    orb_map_run_free(&d->run);
+    orb_free(ctx, d);
+  }
 }

@@ -84,12 +84,24 @@ static orb_status start_coarser(orb_map_run *c) {
   return status;
 }
 
+orb_status orb_map_draft_walks(orb_map_run *c, orb_map_walked *out) {
+  *out = (orb_map_walked){.energy = INFINITY};
+  ORB_TRY(register_first(c));
+  return orb_map_walked_improve(c, out);
+}
+
 /* From walks that the targets guide: the best of them is refined if it comes below the best map so far, and below what
  * the caller knows. */
 static orb_status start_guided(orb_map_run *c) {
   orb_map_walked best = {.energy = INFINITY};
-  orb_status status;
-  ORB_GO(status, orb_map_walked_improve(c, &best), done);
+  orb_status status = ORB_OK;
+  if (c->drafted) {
+    best = *c->drafted;
+    *c->drafted = (orb_map_walked){.energy = INFINITY};
+    c->drafted = NULL;
+  } else {
+    ORB_GO(status, orb_map_walked_improve(c, &best), done);
+  }
   if (best.energy < c->best_energy && !(c->beat.energy > 0 && best.energy >= c->beat.energy)) {
     allow(c);
     ORB_GO(status, orb_map_walked_refine(c, &best), done);
@@ -113,7 +125,9 @@ static orb_status run_passes(orb_map_run *c) {
 /* The first start. *walked: it is a walk. */
 static orb_status run_first(orb_map_run *c, int *walked) {
   const double given = c->best_energy;
-  ORB_TRY(register_first(c));
+  if (!c->drafted) {
+    ORB_TRY(register_first(c));
+  }
   if (c->walks_first) {
     ORB_TRY(start_guided(c));
   }

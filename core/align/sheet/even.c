@@ -5,6 +5,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 #include "embed/newton/newton.h"
 #include "orbmorph/embed.h"
 
@@ -25,25 +26,27 @@ static orb_status embed(orb_context *ctx, const orb_mesh *mesh, double *points, 
   return ORB_OK;
 }
 
+static orb_status embed_shape(orb_context *ctx, void *arg, int32_t s) {
+  const orb_even_shapes *even = arg;
+  orb_align_shape *shape = &even->shapes[s];
+  int valid;
+  double *points = even->points[s] = ORB_NEW(ctx, double, 3 * (size_t)shape->mesh->vertex_count);
+  if (!points) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(embed(ctx, shape->mesh, points, &valid));
+  shape->points = valid ? points : shape->points;
+  return ORB_OK;
+}
+
 orb_status orb_even_shapes_create(orb_context *ctx, const orb_align_shape *shapes, int32_t count,
                                   orb_even_shapes *out) {
   *out = (orb_even_shapes){ORB_NEW(ctx, orb_align_shape, count), ORB_NEW0(ctx, double *, count), count};
   if (!out->shapes || !out->points) {
     return ORB_E_NO_MEMORY;
   }
-  for (int32_t s = 0; s < count; s++) {
-    int valid;
-    out->shapes[s] = shapes[s];
-    out->points[s] = ORB_NEW(ctx, double, 3 * (size_t)shapes[s].mesh->vertex_count);
-    if (!out->points[s]) {
-      return ORB_E_NO_MEMORY;
-    }
-    ORB_TRY(embed(ctx, shapes[s].mesh, out->points[s], &valid));
-    if (valid) {
-      out->shapes[s].points = out->points[s];
-    }
-  }
-  return ORB_OK;
+  memcpy(out->shapes, shapes, (size_t)count * sizeof *shapes);
+  return orb_tasks_run(ctx, count, embed_shape, out);
 }
 
 void orb_even_shapes_free(orb_context *ctx, orb_even_shapes *even) {
