@@ -8,7 +8,18 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { browser, daemon } from './started.mjs';
 import { countPixels, difference, shot } from './pictures.mjs';
-import { addFiles, counted, button, defaultShown, dropFiles, openPage, sample, settled, until } from './support.mjs';
+import {
+  addFiles,
+  counted,
+  button,
+  defaultShown,
+  dropFiles,
+  json,
+  openPage,
+  sample,
+  settled,
+  until,
+} from './support.mjs';
 import { morphOf } from '../scenario/support/glb.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { readPng, writePng } from '../scenario/support/png.mjs';
@@ -110,15 +121,15 @@ test('progress names the stage, says what is left, moves each second, and can be
   await done();
 });
 
-/** A page with a morph of three animals that is ready to be downloaded. */
-async function taking(options) {
-  const opened = await openPage(browser, daemon.url, options);
+/** A page with a morph of animals that is ready to be downloaded. */
+async function taking({ files = ['dog.obj', 'giraffe.off'], landmarks = 'dog-giraffe.json' } = {}) {
+  const opened = await openPage(browser, daemon.url);
   const { page } = opened;
-  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await addFiles(page, ...files.map(sample));
   await button(page, 'Landmarks').click();
-  await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await page.getByLabel('Landmark file').setInputFiles(sample(landmarks));
   await page.locator('.marks li').first().waitFor();
-  await button(page, /^Morph 2 shapes$/).click();
+  await button(page, /^Morph \d shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the morph plays');
   await defaultShown(page);
   await button(page, 'Use it').click();
@@ -253,6 +264,35 @@ test('pictures and films: PNG, GIF, WebP and video, named after the shapes', asy
   );
   assert.deepEqual(size, [360, 360]);
   await other.close();
+  await done();
+});
+
+test('a film goes on to the first shape or back again, is eased, and turns the shape', async () => {
+  const { page, take, download, done } = await taking({
+    files: ['dog.obj', 'giraffe.off', 'elephant.ply'],
+    landmarks: 'dog-giraffe-elephant.json',
+  });
+  await take.getByRole('slider', { name: /seconds a shape/ }).fill('0.5');
+  await take.getByRole('button', { name: '360 × 360' }).click();
+  /** How much each of the 20 frames a second differs from the first one. */
+  const film = async () => (await decode(page, (await download('GIF')).bytes, 'image/gif')).frames.map((f) => f.other);
+  const back = await film();
+  assert.equal(back.length, 40, 'back again: four ways of half a second');
+  await take.getByRole('button', { name: 'On to the first' }).click();
+  await take.getByLabel('Easing').selectOption('linear');
+  const loop = await film();
+  assert.equal(loop.length, 30, 'on to the first: three ways');
+  assert.ok(loop[29] < 0.5 * loop[20] && loop[20] > 0.02, `the last way leads to the first shape: ${loop}`);
+  await take.getByLabel('Easing').selectOption('slow');
+  const slow = await film();
+  assert.ok(slow[2] < 0.8 * loop[2], `a slow start: ${slow[2]}, ${loop[2]}`);
+  await take.getByRole('button', { name: 'Both' }).click();
+  const both = await film();
+  assert.ok(both.length === 30 && Math.abs(both[15] - slow[15]) > 0.01, `it turns as well: ${both[15]}, ${slow[15]}`);
+  await take.getByRole('button', { name: 'A turntable' }).click();
+  const turn = await film();
+  assert.equal(turn.length, 120, 'one turn in six seconds');
+  assert.ok(turn[119] < 0.3 * turn[30], `the end meets the beginning: ${turn[119]}, ${turn[30]}`);
   await done();
 });
 
@@ -437,6 +477,35 @@ test('a link whose morph or shapes are gone says so', async () => {
     assert.match(await alert.innerText(), expected);
     await button(page, 'Dismiss').click();
     await alert.waitFor({ state: 'detached' });
+    await done();
+  }
+});
+
+test('a link that is cut off, or whose job is gone, says so', async () => {
+  const [dog, giraffe] = await Promise.all(
+    ['dog.obj', 'giraffe.off'].map(async (name) => {
+      const init = { method: 'POST', body: await readFile(sample(name)) };
+      return (await json(daemon.url, `/v1/meshes?name=${name.split('.')[0]}`, init)).id;
+    }),
+  );
+  const job = '1'.repeat(32);
+  for (const [hash, cards, expected] of [
+    [`#m=${dog.slice(0, 40)}`, 0, /This link is damaged/],
+    [`#m=${dog},${giraffe.slice(0, 10)}`, 1, /This link is damaged/],
+    [`#m=${dog},${giraffe}&r=${dog.slice(1)}`, 2, /This link is damaged/],
+    [`#m=${dog},${'a'.repeat(64)}`, 1, /1 of the 2 shapes of this link is no longer on the server/],
+    [`#m=${dog},${giraffe}&j=${job}`, 2, /The job of this link is gone\s+The server .* Press Morph to start it again/],
+    [
+      `#m=${dog},${giraffe}&tab=landmarks&j=${job}&find=1`,
+      0,
+      /The job of this link is gone\s+The server .* Press Find them for me/,
+    ],
+  ]) {
+    const { page, done } = await openPage(browser, daemon.url, { hash });
+    const alert = page.getByRole('alert');
+    await alert.waitFor();
+    assert.match(await alert.innerText(), expected);
+    await counted(page.locator('.card'), cards, `${hash}: its shapes`);
     await done();
   }
 });

@@ -128,6 +128,9 @@ test('a fit that turns a shape over is said', async () => {
   await morph(page);
   const said = await page.getByRole('list', { name: 'Shapes that the fit rotated' }).innerText();
   assert.match(said, /The fit rotated the up axis of giraffe by 180°/);
+  const moved = await page.getByRole('row', { name: /^Moved: giraffe/ }).innerText();
+  assert.match(moved, /size × 0\.\d+, rotated by 180°, by 0\.\d+ diagonals/);
+  assert.equal(await page.getByRole('row', { name: /^Moved/ }).count(), 1, 'the first shape stays');
   await done();
 });
 
@@ -248,8 +251,38 @@ test('what is on the server is listed and opened', async () => {
   const listed = await page.locator('dialog .item strong').allInnerTexts();
   assert.ok(listed.includes('dog → giraffe') && listed.includes('giraffe'), listed.join(', '));
   assert.ok(!listed.some((text) => /^[0-9a-f]{6,}/.test(text)), `names, no ids: ${listed.join(', ')}`);
+  // morphs of the same shapes are told apart by their size and age
+  for (const text of await page.locator('.list .item', { hasText: '→' }).allInnerTexts())
+    assert.match(text, /\d triangles · (just now|\d+ (min|h) ago)/);
   await page.locator('.list .item', { hasText: '→' }).first().click();
   await until(() => button(page, /^(Play|Pause)$/).count(), 'the morph opens');
+  await done();
+});
+
+test('a morph whose shapes were deleted says so, and leaves the page as it is', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const pear = async (name, map) => {
+    const { positions, triangles } = ball(2, map);
+    const init = { method: 'POST', body: obj({ positions, triangles }) };
+    return (await json(daemon.url, `/v1/meshes?name=${name}`, init)).id;
+  };
+  const [thin, wide] = [
+    await pear('thin', (p) => [0.6 * p[0], p[1], p[2]]),
+    await pear('wide', (p) => [2 * p[0], ...p.slice(1)]),
+  ];
+  await json(daemon.url, '/v1/supermeshes', {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json', Prefer: 'wait=60' },
+    body: JSON.stringify({ shapes: [{ mesh: thin }, { mesh: wide }], align: { method: 'rotate' } }),
+  });
+  assert.equal((await fetch(`${daemon.url}/v1/meshes/${wide}`, { method: 'DELETE' })).status, 204);
+  await addFiles(page, sample('dog.obj'));
+  await button(page, 'On the server', { exact: true }).click();
+  await page.locator('.list .item', { hasText: 'thin → wide' }).click();
+  const alert = page.getByRole('alert');
+  await alert.waitFor();
+  assert.match(await alert.innerText(), /Shapes of this morph are missing\s+wide is no longer on the server/);
+  assert.deepEqual(await page.locator('.card strong').allInnerTexts(), ['dog']);
   await done();
 });
 

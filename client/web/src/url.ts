@@ -131,7 +131,7 @@ function encodeExtras(): string {
 /** The best match that a URL names, and the numbers of those that are shown and computed. */
 async function decodeMatch(text: string): Promise<{ shown?: Matches; next?: Matches }> {
   const [id, ...numbers] = text.split(',');
-  if (!/^[0-9a-f]{64}$/.test(id)) return {};
+  if (!isId(id)) return {};
   const best = await client.getSupermesh(id).catch(() => null);
   const [shown, next] = numbers.map((at) => (best && matchesOf(best, Number(at))) || undefined);
   return { shown, next };
@@ -171,15 +171,16 @@ function encode(): string {
   return parts.join('&');
 }
 
+const report = (title: string, detail: string) => set({ problem: { title, detail, facts: null } });
+
 /** Says that nothing of a link is left. what: "its morph is" */
 const dead = (what: string) =>
-  set({
-    problem: {
-      title: 'This link is dead',
-      detail: `${what[0].toUpperCase()}${what.slice(1)} not on the server ${location.host}: deleted, or the link is from another server. Drop the files here to make the morph again.`,
-      facts: null,
-    },
-  });
+  report(
+    'This link is dead',
+    `${what[0].toUpperCase()}${what.slice(1)} not on the server ${location.host}: deleted, or the link is from another server. Drop the files here to make the morph again.`,
+  );
+
+const isId = (text: string) => /^[0-9a-f]{64}$/.test(text);
 
 /** A new URL costs the browser some 30 ms: it draws its address and loads the icon. So the URL is written at rest. */
 const REST = 600; // ms: longer than a frame of a large shape
@@ -248,8 +249,14 @@ export async function restore() {
     if (camera) stage.orbit.restore(camera);
     const options = query.get('o');
     if (options) set({ options: decodeOptions(options) });
-    const ids = (query.get('m') ?? '').split(',').filter((id) => /^[0-9a-f]{64}$/.test(id));
+    const named = (query.get('m') ?? '').split(',').filter(Boolean);
+    const ids = named.filter(isId);
     const result = query.get('r');
+    if (ids.length < named.length || (result !== null && !isId(result)))
+      report(
+        'This link is damaged',
+        'A part of it is missing, as when a line breaks in it. Copy the whole link again.',
+      );
     const tab = query.get('tab') as Tab;
     let lost = 0;
     if (ids.length) {
@@ -264,13 +271,10 @@ export async function restore() {
       }
       if (lost === ids.length) dead(`its ${lost > 1 ? `${lost} shapes are` : 'shape is'}`);
       else if (lost)
-        set({
-          problem: {
-            title: 'Some shapes are missing',
-            detail: `${lost} of the ${ids.length} shapes in this URL are no longer on the server. Add the files again.`,
-            facts: null,
-          },
-        });
+        report(
+          'Some shapes are missing',
+          `${lost} of the ${ids.length} shapes of this link ${lost > 1 ? 'are' : 'is'} no longer on the server. Add the files again.`,
+        );
     }
     const landmarks = (query.get('l') ?? '')
       .split(';')
@@ -283,7 +287,7 @@ export async function restore() {
     const paint = PAINTS.find((name) => name === query.get('paint'));
     if (paint) setPaint(paint);
     if (query.get('wire')) set({ wire: true });
-    if (result && ids.length) {
+    if (result && isId(result) && ids.length) {
       const [supermesh, matches] = await Promise.all([
         client.getSupermesh(result).catch(() => null),
         decodeMatch(query.get('q') ?? ''),
@@ -291,17 +295,17 @@ export async function restore() {
       next = matches.next;
       const look = Number(query.get('look')) || 0;
       const extras = (query.get('e') ?? '').split(',').flatMap((text) => (text ? [Number(text) || 0] : []));
-      if (supermesh) await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown, look, extras });
-      else if (!lost)
-        set({
-          problem: {
-            title: 'The morph of this link is gone',
-            detail: 'It was deleted from the server. Its shapes are here: press Morph to make it again.',
-            facts: null,
-          },
-        });
-    } else if (result && (await client.getSupermesh(result).catch(() => null))) await openSupermesh(result, false);
-    else if (result) dead('its morph is');
+      if (supermesh && state.shapes.length)
+        await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown, look, extras });
+      else if (!supermesh && !lost)
+        report(
+          'The morph of this link is gone',
+          'It was deleted from the server. Its shapes are here: press Morph to make it again.',
+        );
+    } else if (result && isId(result) && !named.length) {
+      if (await client.getSupermesh(result).catch(() => null)) await openSupermesh(result, false);
+      else dead('its morph is');
+    }
     const time = Number(query.get('t'));
     if (state.result && query.has('t') && Number.isFinite(time)) player.seek(time);
     if (state.result && query.get('side') === 'after') set({ side: 'after' });

@@ -199,6 +199,14 @@ function showFast(running: Running, request: SupermeshRequest): Promise<void> {
   });
 }
 
+/** The server has forgotten a job, or never had it. */
+class GoneError extends Error {
+  constructor(purpose: Running['purpose']) {
+    const button = purpose === 'find' ? 'Find them for me' : 'Morph';
+    super(`The server ${location.host} no longer has the job of this link. Press ${button} to start it again.`);
+  }
+}
+
 /** Follows a job that an earlier visit started. `matches`: those of which it computes one. */
 export async function resumeJob(id: string, purpose: Running['purpose'] = 'morph', matches?: Matches) {
   const running: Running = { purpose, job: null, abort: new AbortController(), fast: null, matches };
@@ -211,7 +219,7 @@ export async function resumeJob(id: string, purpose: Running['purpose'] = 'morph
         return await client.result<Supermesh>(id, { signal, onProgress: progress(running) });
       } catch (error) {
         if (signal.aborted) await client.cancelJob(id).catch(() => {});
-        throw error;
+        throw error instanceof ProblemError && error.status === 404 ? new GoneError(purpose) : error;
       }
     },
     null,
@@ -255,7 +263,8 @@ function describe(error: unknown) {
     return { title: 'The token does not allow this', detail: explain(error), facts: null };
   if (error instanceof ProblemError)
     return { title: error.title || 'The daemon refused the request', detail: error.detail, facts: error.problem };
-  return { title: 'The request failed', detail: (error as Error).message, facts: null };
+  const title = error instanceof GoneError ? 'The job of this link is gone' : 'The request failed';
+  return { title, detail: (error as Error).message, facts: null };
 }
 
 const PROPOSALS = 12;

@@ -1,5 +1,5 @@
 /** Lists, opens and deletes what the server stores. */
-import type { Mesh, Supermesh } from 'orbmorph';
+import { ProblemError, type Mesh, type Supermesh } from 'orbmorph';
 import { client, set, state, toast } from '../state';
 import { addFromServer, removeShape } from './shapes';
 import { openResult, resumeJob } from './merge';
@@ -33,7 +33,7 @@ export async function openSupermesh(id: string, play = true) {
   set({ drawer: null });
   try {
     const supermesh = await client.getSupermesh(id);
-    await openShapes(supermesh);
+    if (!(await openShapes(supermesh))) return;
     await openResult(supermesh, supermesh.request ?? null);
     set({ tab: 'morph', show: 'morph' });
     if (play) player.play();
@@ -42,15 +42,31 @@ export async function openSupermesh(id: string, play = true) {
   }
 }
 
-async function openShapes(supermesh: Supermesh) {
+/** Opens the shapes of a morph in place of those of the page; says so and returns false if the server lacks one. */
+async function openShapes(supermesh: Supermesh): Promise<boolean> {
   const wanted = supermesh.shapes.map((shape) => shape.mesh);
   const present = state.shapes.map((shape) => shape.mesh?.id);
-  if (wanted.length === present.length && wanted.every((id, i) => id === present[i])) return;
+  if (wanted.length === present.length && wanted.every((id, i) => id === present[i])) return true;
+  const meshes = await Promise.all(
+    wanted.map((id) =>
+      client.getMesh(id).catch((error) => {
+        if (error instanceof ProblemError && error.status === 404) return null;
+        throw error;
+      }),
+    ),
+  );
+  const gone = new Set(supermesh.shapes.flatMap(({ name }, i) => (meshes[i] ? [] : [name])));
+  if (gone.size) {
+    const detail = `${[...gone].join(', ')} ${gone.size > 1 ? 'are' : 'is'} no longer on the server. Add the files, and morph them again.`;
+    set({ problem: { title: 'Shapes of this morph are missing', detail, facts: null } });
+    return false;
+  }
   for (const shape of [...state.shapes]) removeShape(shape.key);
-  for (const id of wanted) await addFromServer(await client.getMesh(id));
+  for (const mesh of meshes) await addFromServer(mesh!);
   const given = supermesh.request?.landmarks;
   const placed = Array.isArray(given) ? given : [];
   if (placed.length) await takeLandmarks(placed, { undoable: false });
+  return true;
 }
 
 export async function watchJob(id: string) {

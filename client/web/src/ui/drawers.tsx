@@ -78,7 +78,10 @@ function Server() {
             <li key={item.id}>
               <button type="button" class="item" onClick={() => void openSupermesh(item.id)}>
                 <strong>{name}</strong>
-                <span class="muted">{item.triangles !== undefined && `${count(item.triangles)} triangles`}</span>
+                <span class="muted">
+                  {item.triangles !== undefined && `${count(item.triangles)} triangles · `}
+                  {when(item.created)}
+                </span>
               </button>
               <Button
                 kind="quiet"

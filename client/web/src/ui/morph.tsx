@@ -297,6 +297,19 @@ export function MorphInspector() {
               </td>
             </tr>
           )}
+          {supermesh.shapes.map(
+            ({ name, fit }, i) =>
+              fit &&
+              fit.kind !== 'none' && (
+                <tr key={i}>
+                  <th scope="row">Moved: {name}</th>
+                  <td>
+                    size × {Number(fit.scale.toPrecision(2))}, rotated by {Math.round(fit.rotation_degrees)}°, by{' '}
+                    {Number(fit.translation_relative.toPrecision(2))} diagonals
+                  </td>
+                </tr>
+              ),
+          )}
           <tr>
             <th scope="row">Time</th>
             <td data-varies>
