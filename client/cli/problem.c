@@ -89,7 +89,9 @@ const char *cli_advice(const char *type) {
        "the right object; scale it or move it to the origin."},
       {"not-finite",
        "Some coordinates are not finite numbers or exceed 1e30. Export the mesh again, or scale it down."},
-      {"malformed-mesh", "The file is damaged or truncated at the reported position. Export or download it again."},
+      {"malformed-mesh",
+       "The file is damaged or truncated at the reported position, or holds no surface. Export or download it again; "
+       "of a cloud of points, make a surface first."},
       {"unknown-format", "The supported formats are OBJ, OFF, PLY, STL, 3MF, glTF and GLB."},
       {"too-large", "The mesh is larger than the daemon accepts. Decimate it first, or raise the daemon's limits."},
   };

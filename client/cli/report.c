@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "problem.h"
 #include "terminal.h"
@@ -12,6 +13,8 @@
 
 /* Rims no farther apart lie on each other but for rounding, relative to the diagonal. */
 static const double RIM_EXACT = 1e-6;
+/* Relative distances below this are rounding of double numbers, and printed as 0. */
+static const double ROUNDING = 1e-12;
 
 static const cJSON *member(const cJSON *object, const char *name) {
   return cJSON_GetObjectItemCaseSensitive(object, name);
@@ -66,7 +69,7 @@ void cli_print_job(const cJSON *job) {
 /* "0.04 %", or "?" if it was not measured. */
 static void percent(double fraction, char out[32]) {
   if (isfinite(fraction)) {
-    snprintf(out, 32, "%.3g %%", 100 * fraction);
+    snprintf(out, 32, "%.3g %%", fabs(fraction) < ROUNDING ? 0 : 100 * fraction);
   } else {
     snprintf(out, 32, "?");
   }
@@ -102,16 +105,25 @@ static int were_guessed(const cJSON *supermesh) {
   return 0;
 }
 
+static int is_moved(const cJSON *shape) {
+  const cJSON *fit = member(shape, "fit");
+  return fit && strcmp(cli_string(fit, "kind", "none"), "none") != 0;
+}
+
+static void write_fit(FILE *out, const cJSON *shape) {
+  const cJSON *fit = member(shape, "fit");
+  fprintf(out, "moved onto the first shape: scaled by %.3g, rotated by %.0f°, moved by %.2g diagonals%s\n",
+          cli_number(fit, "scale"), cli_number(fit, "rotation_degrees"), cli_number(fit, "translation_relative"),
+          cli_number(fit, "up_degrees") > 60 ? "; its y axis tilts by more than 60°" : "");
+}
+
 /* A line for each shape that the asset has moved. */
 static void print_fits(const cJSON *supermesh) {
   const cJSON *shape;
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
-    const cJSON *fit = member(shape, "fit");
-    double up = cli_number(fit, "up_degrees");
-    if (fit && strcmp(cli_string(fit, "kind", "none"), "none") != 0) {
-      printf("  %-16s moved onto the first shape: scaled by %.3g, rotated by %.0f°, moved by %.2g diagonals%s\n",
-             cli_string(shape, "name", "?"), cli_number(fit, "scale"), cli_number(fit, "rotation_degrees"),
-             cli_number(fit, "translation_relative"), up > 60 ? "; its y axis tilts by more than 60°" : "");
+    if (is_moved(shape)) {
+      printf("  %-16s ", cli_string(shape, "name", "?"));
+      write_fit(stdout, shape);
     }
   }
 }
@@ -249,10 +261,25 @@ static void markdown_shapes(FILE *out, const cJSON *supermesh) {
     const cJSON *normals = member(shape, "normal_deviation");
     percent(cli_number(shape, "hausdorff_relative"), error);
     percent(cli_number(shape, "rms_relative"), rms);
-    fprintf(out, "| %s | %s | %s | %.3g° | %.3g° |\n", cli_string(shape, "name", "?"), error, rms,
-            cli_number(normals, "mean"), cli_number(normals, "p99"));
+    fputs("| ", out);
+    markdown_text(out, cli_string(shape, "name", "?"));
+    fprintf(out, " | %s | %s | %.3g° | %.3g° |\n", error, rms, cli_number(normals, "mean"), cli_number(normals, "p99"));
   }
   fputs("\nDistances are fractions of the diagonal of each shape's bounding box.\n", out);
+}
+
+/* What the fit did to each shape that the asset has moved. */
+static void markdown_fits(FILE *out, const cJSON *supermesh) {
+  const cJSON *shape;
+  int count = 0;
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    if (is_moved(shape)) {
+      fputs(count++ ? "* " : "\n* ", out);
+      markdown_text(out, cli_string(shape, "name", "?"));
+      fputs(": ", out);
+      write_fit(out, shape);
+    }
+  }
 }
 
 static void markdown_numbers(FILE *out, const char *title, const cJSON *object) {
@@ -284,7 +311,8 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   const cJSON *shape, *landmark, *certificate = member(supermesh, "certificate");
   fputs("# Morph of ", out);
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
-    fprintf(out, "%s%s", cli_string(shape, "name", "?"), shape->next ? ", " : "\n\n");
+    markdown_text(out, cli_string(shape, "name", "?"));
+    fputs(shape->next ? ", " : "\n\n", out);
   }
   cli_count(cli_number(supermesh, "vertices"), vertices);
   cli_count(cli_number(supermesh, "triangles"), triangles);
@@ -299,6 +327,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   }
   markdown_warnings(out, supermesh);
   markdown_shapes(out, supermesh);
+  markdown_fits(out, supermesh);
   if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
     const char *exact = cJSON_IsTrue(member(certificate, "landmarks_exact"))
                             ? were_guessed(supermesh)
@@ -311,7 +340,9 @@ static void markdown(FILE *out, const cJSON *supermesh) {
                 : exact);
     cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
       const cJSON *residual;
-      fprintf(out, "| %s |", cli_string(landmark, "name", ""));
+      fputs("| ", out);
+      markdown_text(out, cli_string(landmark, "name", ""));
+      fputs(" |", out);
       cJSON_ArrayForEach(residual, member(landmark, "residual_relative")) {
         char text[32];
         percent(residual->valuedouble, text);
@@ -329,7 +360,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
 int cli_write_report(cli *c, const char *path, const cli_reply *supermesh) {
   size_t length = strlen(path);
   FILE *out = fopen(path, "wb");
-  if (out && length > 3 && !strcmp(path + length - 3, ".md")) {
+  if (out && length > 3 && !strcasecmp(path + length - 3, ".md")) {
     markdown(out, supermesh->json);
   } else if (out) {
     fprintf(out, "%s\n", supermesh->body);

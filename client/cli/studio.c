@@ -94,6 +94,11 @@ static int upload_all(cli *c, char **fragment) {
   for (int i = 0; i < c->args.operand_count; i++) {
     cli_mesh mesh;
     int rc = cli_mesh_of(c, i, &mesh);
+    if (rc == CLI_REFUSED) {
+      cli_note(c,
+               "The studio shows what is wrong with a mesh, and offers repairs: start it without this file, and drop "
+               "the file on its page.");
+    }
     if (rc != CLI_DONE) {
       return rc;
     }
@@ -105,13 +110,13 @@ static int upload_all(cli *c, char **fragment) {
   return CLI_DONE;
 }
 
-/* Opens a page with $BROWSER, or with what the desktop opens pages with. Silent if there is no desktop. */
-static void open_browser(const char *url) {
+/* Opens a page with $BROWSER, or with what the desktop opens pages with. Says so if there is no such program. */
+static void open_browser(const cli *c, const char *url) {
   const char *browser = getenv("BROWSER");
   const char *const programs[] = {browser && *browser ? browser : "xdg-open", "open", "wslview"};
   pid_t child = fork();
   if (child == 0) {
-    int nothing = open("/dev/null", O_RDWR);
+    int terminal = fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3), nothing = open("/dev/null", O_RDWR);
     for (int fd = 0; nothing >= 0 && fd < 3; fd++) {
       dup2(nothing, fd);
     }
@@ -119,6 +124,8 @@ static void open_browser(const char *url) {
     for (size_t i = 0; i < sizeof programs / sizeof programs[0]; i++) {
       execlp(programs[i], programs[i], url, (char *)NULL);
     }
+    dup2(terminal, STDERR_FILENO);
+    cli_note(c, "No program to open a browser was found: open the address above yourself.");
     _exit(127);
   }
 }
@@ -133,7 +140,7 @@ static int serve(cli *c, pid_t daemon, char *address) {
     fflush(stdout);
     cli_note(c, "The studio runs until you press Ctrl-C.");
     if (!c->args.value[OPT_NO_OPEN]) {
-      open_browser(url);
+      open_browser(c, url);
     }
     free(url);
     while (!ending) {

@@ -517,6 +517,57 @@ test('a report warns of what is worse than asked, and only of that', async (t) =
   assert.match(await readFile(report, 'utf8'), /## Warnings\n\n(.*\n)*\* The morph differs .* \(tolerance 0\.1 %\)/);
 });
 
+test('a report in Markdown says how the fit moved a shape, and takes any name and ending', async (t) => {
+  const d = await daemon(t);
+  const at = await folder(t);
+  // centimetres with z up
+  const big = (line) => line.replace(/^v (\S+) (\S+) (\S+)/, (_, x, y, z) => `v ${100 * x} ${-100 * z} ${100 * y}`);
+  await writeFile(path.join(at, 'dog|cm.obj'), (await readFile(dog, 'utf8')).split('\n').map(big).join('\n'));
+  const list = JSON.parse(await readFile(landmarks, 'utf8')).landmarks;
+  const marks = list.map((l) => ({ ...l, name: `${l.name}|`, at: [l.at[0], l.at[0]] }));
+  await writeFile(path.join(at, 'marks.json'), JSON.stringify(marks));
+  const args = ['morph', dog, 'dog|cm.obj', '-l', 'marks.json', '-o', 'x.glb', '--report', 'r.MD'];
+  const { code, out, err } = await run(args, { env: { ORBMORPH_SERVER: d.url }, cwd: at });
+  assert.equal(code, 0, err);
+  const moved = /moved onto the first shape: scaled by 0\.01, rotated by 90°, moved by [\d.]+ diagonals; its y axis/;
+  assert.match(out, moved);
+  const report = await readFile(path.join(at, 'r.MD'), 'utf8');
+  assert.match(report, /^# Morph of dog, dog\\\|cm\n/);
+  assert.match(
+    report.split('\n').find((line) => line.startsWith('* dog')),
+    moved,
+  );
+  // unescaped bars end cells: each row has as many as the head of its table
+  for (const table of report.split('\n\n').filter((part) => part.startsWith('| '))) {
+    const bars = table
+      .split('\n')
+      .filter((line) => line.startsWith('|'))
+      .map((line) => line.match(/(?<!\\)\|/g).length);
+    assert.equal(new Set(bars).size, 1, table);
+  }
+  assert.doesNotMatch(report + out, /e-1\d %/, 'rounding is no distance');
+});
+
+test('studio says what to do where no browser opens, and with a file that is refused', async (t) => {
+  const at = await folder(t);
+  const child = spawn(binaries.client, ['studio', '--data', path.join(at, 'data')], {
+    env: { PATH: at, BROWSER: path.join(at, 'none') },
+    stdio: ['ignore', 'ignore', 'pipe'],
+  });
+  t.after(() => child.kill('SIGKILL'));
+  let err = '';
+  child.stderr.on('data', (chunk) => (err += chunk));
+  await until(() => /open the address above yourself/.test(err), 'the note');
+  const ended = new Promise((resolve) => child.on('exit', resolve));
+  child.kill('SIGINT');
+  assert.equal(await ended, 0);
+  const ring = path.join(at, 'ring.obj');
+  await writeFile(ring, shapes.obj(shapes.torus()));
+  const refused = await run(['studio', '--no-open', '--data', path.join(at, 'data'), ring], {});
+  assert.equal(refused.code, 1, refused.err);
+  assert.match(refused.err, /not-genus-zero[\s\S]*start it without this file, and drop the file on its page/);
+});
+
 test('studio starts a daemon of its own on a free port, uploads files and opens the browser', async (t) => {
   const at = await folder(t);
   const seen = path.join(at, 'seen');
@@ -565,6 +616,17 @@ test('doctor says what a repair would leave, and calls none helpful that takes m
   const other = await run(['upload', crumb, '--take-part', '1'], { env });
   assert.equal(other.code, 0, other.err);
   assert.match(other.out, /32 triangles\n {2}repaired: part \(1\)/);
+});
+
+test('a cloud of points is not called damaged only', async (t) => {
+  const d = await daemon(t);
+  const cloud = path.join(await folder(t), 'cloud.ply');
+  const head = ['ply', 'format ascii 1.0', 'element vertex 1', ...['x', 'y', 'z'].map((k) => `property float ${k}`)];
+  await writeFile(cloud, [...head, 'end_header', '0 0 0', ''].join('\n'));
+  const { code, out, err } = await run(['doctor', cloud], { env: { ORBMORPH_SERVER: d.url } });
+  assert.equal(code, 1);
+  assert.match(err, /holds no faces/);
+  assert.match(out, /of a cloud of points, make a surface first/);
 });
 
 test('doctor lists the faults behind the first, and the size of handles that closes them', async (t) => {
