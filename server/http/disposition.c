@@ -44,6 +44,26 @@ static const char *append_name(const char *at, char *out, size_t *n) {
   return at;
 }
 
+/* Ends a name of n bytes. otherwise: the name if these are none. */
+static void end_name(char out[DISPOSITION_NAME], size_t n, const char *otherwise, const char *format) {
+  if (n == 0) {
+    n = (size_t)snprintf(out, DISPOSITION_NAME, "%s", otherwise);
+  } else if (out[0] == '.' || out[0] == '-') { /* a hidden file, or one that a command takes for an option */
+    out[0] = '_';
+  }
+  (void)snprintf(out + n, DISPOSITION_NAME - n, ".%s", format);
+}
+
+void disposition_mesh_name(const char *description, const char *format, char out[DISPOSITION_NAME]) {
+  static const char mark[] = "\",\"name\":\"";
+  const char *at = strstr(description, mark);
+  size_t n = 0;
+  if (at) {
+    append_name(at + sizeof mark - 1, out, &n);
+  }
+  end_name(out, n, "mesh", format);
+}
+
 /* The description begins with its shapes, and in JSON no name can contain the unescaped mark. */
 void disposition_name(const char *description, char out[DISPOSITION_NAME]) {
   static const char mark[] = "{\"mesh\":\"", after[] = "\",\"name\":\"";
@@ -59,11 +79,7 @@ void disposition_name(const char *description, char out[DISPOSITION_NAME]) {
     }
     at = append_name(at + sizeof after - 1, out, &n);
   }
-  if (n > 0 &&
-      (out[0] == '.' || out[0] == '-')) { /* the name of a hidden file, or one that a command takes for an option */
-    out[0] = '_';
-  }
-  memcpy(out + n, n ? ".glb" : "asset.glb", n ? 5 : 10);
+  end_name(out, n, "asset", "glb");
 }
 
 void disposition_write(const char *name, char out[DISPOSITION_SIZE]) {

@@ -25,7 +25,7 @@ static void reply_part_of_spheres(request *r, int shape, const char *name) {
 /* 0 without a response outside a task, if one is needed to verify, make or compress the object; releases the
  * description. */
 static int file_of(request *r, const cached *entry) {
-  char name[100], format[sizeof(api_format_name)] = "bin", disposition[DISPOSITION_SIZE];
+  char name[DISPOSITION_NAME], format[sizeof(api_format_name)] = "bin", disposition[DISPOSITION_SIZE];
   int done = 1;
   switch (r->route->id) {
     case ROUTE_MESH_FILE: {
@@ -34,7 +34,7 @@ static int file_of(request *r, const cached *entry) {
         at += strlen("\"format\":\"");
         snprintf(format, sizeof format, "%.*s", (int)strcspn(at, "\""), at);
       }
-      snprintf(name, sizeof name, "%.16s.%s", r->id, format);
+      disposition_mesh_name(entry->row.json, format, name);
       disposition_write(name, disposition);
       done = object_is_ready(r, OBJECT_MESH, entry->row.sha) &&
              reply_object(r, OBJECT_MESH, r->id, r->id,

@@ -75,7 +75,19 @@ test('every format is detected by its content', async (t) => {
     assert.equal(reply.json.vertices, m.positions.length, format);
     assert.equal(reply.json.triangles, m.triangles.length, format);
     const file = await d.get(`${reply.json.url}/file`);
-    assert.match(file.headers.get('content-disposition'), new RegExp(`\\.${format}\\b`), format);
+    assert.equal(file.headers.get('content-disposition'), `inline; filename="misleading.xyz.${format}"`);
+  }
+  for (const [name, value] of [
+    ['dog', 'filename="dog.obj"'],
+    ['-rf', 'filename="_rf.obj"'],
+    ['a/b"c', `filename="a_b_c.obj"`],
+    ['Kätzchen', `filename="K_tzchen.obj"; filename*=UTF-8''K%C3%A4tzchen.obj`],
+    ['x'.repeat(127), `filename="${'x'.repeat(127)}.obj"`],
+  ]) {
+    const { json } = await d.upload(obj(ball(1)), { name });
+    const { headers } = await d.get(`${json.url}/file`);
+    assert.equal(headers.get('content-disposition'), `inline; ${value}`);
+    assert.equal((await d.delete(json.url)).status, 204);
   }
   const big = await d.upload(shapes.binaryPly(m, true));
   assert.equal(big.status, 201, big.bytes.toString());
