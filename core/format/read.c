@@ -46,30 +46,24 @@ orb_format orb_format_of_name(const char *name) {
   return ORB_FORMAT_AUTO;
 }
 
-static orb_format detect(const unsigned char *bytes, size_t size, orb_certainty *surest) {
+orb_format orb_format_detect(const unsigned char *bytes, size_t size) {
   orb_format found = ORB_FORMAT_AUTO;
-  *surest = ORB_NO;
-  for (int i = 0; i < READER_COUNT && size > 0 && *surest < ORB_SURE; i++) {
+  orb_certainty surest = ORB_NO;
+  for (int i = 0; i < READER_COUNT && size > 0 && surest < ORB_SURE; i++) {
     orb_certainty certainty = READERS[i].is(bytes, size);
-    if (certainty > *surest) {
-      *surest = certainty;
+    if (certainty > surest) {
+      surest = certainty;
       found = READERS[i].format;
     }
   }
-  return found;
-}
-
-orb_format orb_format_detect(const unsigned char *bytes, size_t size) {
-  orb_certainty surest;
-  return detect(bytes, size, &surest);
+  return surest < ORB_SURE && orb_format_other(bytes, size) ? ORB_FORMAT_AUTO : found;
 }
 
 orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_format format, orb_mesh *out,
                          orb_format *format_out) {
-  orb_certainty surest = ORB_SURE;
   memset(out, 0, sizeof *out);
   if (format == ORB_FORMAT_AUTO) {
-    format = detect(bytes, size, &surest);
+    format = orb_format_detect(bytes, size);
   }
   if (format_out) {
     *format_out = format;
@@ -77,7 +71,7 @@ orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t si
   if (size == 0) {
     return orb_build_malformed(ctx, 0, 0, "The file is empty; send the bytes of a mesh file.");
   }
-  const char *other = surest < ORB_SURE ? orb_format_other(bytes, size) : NULL;
+  const char *other = format == ORB_FORMAT_AUTO ? orb_format_other(bytes, size) : NULL;
   if (other) {
     return orb_fail(ctx, ORB_E_UNKNOWN_FORMAT, "This is %s.", other);
   }

@@ -184,6 +184,14 @@ test('files of other kinds are refused by name, with advice', async (t) => {
     ['<?xml version="1.0"?>\n<COLLADA xmlns="x">', /Collada file/],
     ['<!doctype html>\n<html lang="en">', /web page/],
     ['\x89PNG\r\n\x1a\n', /PNG picture/],
+    ['MM\x0a\0\0\0\x02\0\x0a\0', /3DS file.*glTF/],
+    [`PK\x03\x04${'\0'.repeat(26)}scene.usdc`, /USDZ file.*glTF/],
+    ['  0\r\nSECTION\r\n  2\r\nHEADER\r\n', /DXF file.*glTF/],
+    ['3D Geometry File Format        5', /Rhino file.*mesh/],
+    ['# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n', /PCD file, a cloud of points/],
+    // the second line could be of an OBJ
+    ['# vtk DataFile Version 3.0\nv of a bone\nASCII\nDATASET POLYDATA\n', /VTK file.*PLY/],
+    ['#VRML V2.0 utf8\n', /VRML file.*glTF/],
   ];
   for (const [text, expected] of kinds) {
     const reply = await d.upload(Buffer.from(text, 'latin1'));

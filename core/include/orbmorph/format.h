@@ -26,7 +26,7 @@ ORB_API const char *orb_format_name(orb_format format); /* "obj", … ; "auto" *
 /* "obj" → ORB_FORMAT_OBJ; ORB_FORMAT_AUTO for an unknown name. */
 ORB_API orb_format orb_format_of_name(const char *name);
 
-/* The format of these bytes by their content; ORB_FORMAT_AUTO if it is none of them. */
+/* The format of these bytes by their content; ORB_FORMAT_AUTO if it is none of them, such as FBX. */
 ORB_API orb_format orb_format_detect(const unsigned char *bytes, size_t size);
 
 /* Reads a mesh as it is in the file: polygons are cut into triangles, nothing else is repaired (see orb_mesh_repair()).
