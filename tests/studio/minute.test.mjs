@@ -18,6 +18,7 @@ import {
   openPage,
   sample,
   settled,
+  shownToasts,
   until,
 } from './support.mjs';
 import { morphOf } from '../scenario/support/glb.mjs';
@@ -363,6 +364,38 @@ function dressed() {
     { name: 'blue.ply', mimeType: 'text/plain', buffer: Buffer.from(`${lines.join('\n')}\n`) },
   ];
 }
+
+test('files of a glTF that are dropped with it are put into it; other files without a shape are left out', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const folder = mkdtempSync(join(tmpdir(), 'orbmorph-drop-'));
+  const { buffer } = dressed()[0];
+  const size = buffer.readUInt32LE(12);
+  const document = JSON.parse(buffer.toString('utf8', 20, 20 + size));
+  const bin = buffer.subarray(28 + size);
+  document.buffers[0].uri = 'my%20ball.bin';
+  const view = document.bufferViews[document.images[0].bufferView];
+  document.images[0] = { uri: 'textures/skin.png' };
+  const files = {
+    'ball.gltf': JSON.stringify(document),
+    'my ball.bin': bin,
+    'skin.png': bin.subarray(view.byteOffset, view.byteOffset + view.byteLength),
+    'egg.obj': `mtllib egg.mtl\n${obj(ball(3, ([x, y, z]) => [x, 1.3 * y, z]))}`,
+    'egg.mtl': 'newmtl red\nKd 1 0 0\n',
+  };
+  for (const [name, bytes] of Object.entries(files)) await writeFile(join(folder, name), bytes);
+  await page.locator('input[type=file]').first().waitFor({ state: 'attached' });
+  await dropFiles(page, ...Object.keys(files).map((name) => join(folder, name)));
+  await until(async () => (await shownToasts(page)).some((text) => /Left out.*: egg\.mtl$/.test(text)), 'what is left');
+  await defaultShown(page);
+  await button(page, 'Pause').click();
+  const [top, bottom] = await halves(page, 0);
+  assert.ok(top[0] > 4000 && top[0] > 8 * top[1], `red above: ${top}`);
+  assert.ok(bottom[1] > 4000 && bottom[1] > 2 * bottom[0], `green below: ${bottom}`);
+  await button(page, 'Shapes', { exact: true }).click();
+  assert.deepEqual(await page.locator('.card strong').allInnerTexts(), ['ball', 'egg']);
+  rmSync(folder, { recursive: true });
+  await done();
+});
 
 /**
  * The numbers of pixels of the upper and the lower half of a view that are red, green, blue: one channel far stronger

@@ -2,6 +2,7 @@
 import { ProblemError, type Mesh, type Problem } from 'orbmorph';
 import samples from 'virtual:samples';
 import { client, patch, set, shapeOf, state, tint, toast, type Shape } from '../state';
+import { meshesOf } from '../mesh/companions';
 import { withRepairs } from '../mesh/repairs';
 import { work } from '../mesh/work';
 import { shapeModel } from '../view/models';
@@ -119,12 +120,14 @@ async function showDefects(shape: Shape, error: ProblemError) {
 
 const drawn = new Map<string, Promise<void>>();
 
-export async function addFiles(files: Iterable<File>) {
-  const list = [...files];
-  if (!list.length) return;
+/** Adds the meshes among these files, and returns their number. */
+export async function addFiles(files: Iterable<File>): Promise<number> {
+  const { meshes, left } = await meshesOf([...files]);
+  if (!meshes.length) return 0;
+  if (left.length) toast(`Left out, because no shape is in them: ${left.join(', ')}`);
   set({ tab: 'shapes' });
   await Promise.all(
-    list.map(async (file) => {
+    meshes.map(async (file) => {
       const shape = create(file.name.replace(/\.[A-Za-z0-9]{1,5}$/, ''));
       shape.file = file;
       drawn.set(
@@ -134,6 +137,7 @@ export async function addFiles(files: Iterable<File>) {
       await send(shape);
     }),
   );
+  return meshes.length;
 }
 
 export async function addSamples(list: Sample[]) {
