@@ -71,7 +71,8 @@ static void list_faults(const cJSON *problem) {
   cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(problem, "parts")) {
     char triangles[32];
     cli_count(cli_number(item, "triangles"), triangles);
-    printf("  part %.0f: %s triangles  %s\n", cli_number(item, "part"), triangles, cli_string(item, "name", ""));
+    printf("  part %.0f: %s triangle%s  %s\n", cli_number(item, "part"), triangles, strcmp(triangles, "1") ? "s" : "",
+           cli_string(item, "name", ""));
   }
   const cJSON *length = lengths ? lengths->child : NULL;
   cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(problem, "loops")) {

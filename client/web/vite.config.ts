@@ -7,8 +7,7 @@ const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 const isMesh = (name: string) => /\.(obj|off|ply|stl|3mf|gltf|glb)$/i.test(name);
 
 /**
- * Bundles the repository's sample meshes as assets. `virtual:samples` lists them as {name, file, bytes, url}; "Try with
- * samples" opens the first two.
+ * Bundles the repository's sample meshes as assets. `virtual:samples` lists them as {name, file, bytes, url}.
  */
 function samples(): Plugin {
   const folder = here('../../tests/samples');

@@ -732,6 +732,10 @@ test('doctor splits edges of three faces', async (t) => {
     sick.out,
     /helps: orbmorph upload --repair split_nonmanifold,largest_component .*\n {2}left: 6 triangles; the file has 7/,
   );
+  const fan = path.join(path.dirname(wall), 'fan.obj');
+  await writeFile(fan, 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n');
+  const split = await run(['doctor', fan], { env: { ORBMORPH_SERVER: d.url } });
+  assert.match(split.out, /^ {2}part 0: 1 triangle {2}$/m);
 });
 
 test('doctor lists handles, and upload closes them', async (t) => {

@@ -33,13 +33,21 @@ test('from the empty page to a playing morph in at most five clicks', async () =
     await button(page, name).click();
     clicks++;
   };
+  // the first sample arrives last
+  await page.route('**/dog*.obj', async (route) => {
+    await new Promise((resolve) => setTimeout(resolve, 700));
+    await route.continue();
+  });
   await click('Try with samples');
   await counted(page.locator('.card.ready'), 2, 'two samples are taken');
+  assert.deepEqual(await page.locator('.card strong').allInnerTexts(), ['dog', 'giraffe']);
   await click(/^Morph 2 shapes$/);
   await until(() => button(page, 'Pause').count(), 'the morph plays');
   const seen = new Set();
   await until(async () => seen.add(await time(page)).size > 5, 'time passes');
   assert.ok(clicks <= 5, `${clicks} clicks`);
+  await page.getByText('Shown: the default morph.').waitFor();
+  assert.equal(await page.getByText(/^Not sure/).count(), 0, 'the samples show a match that is worth showing');
   await done();
 });
 
