@@ -297,19 +297,6 @@ export function MorphInspector() {
               </td>
             </tr>
           )}
-          {supermesh.shapes.map(
-            ({ name, fit }, i) =>
-              fit &&
-              fit.kind !== 'none' && (
-                <tr key={i}>
-                  <th scope="row">Moved: {name}</th>
-                  <td>
-                    size × {Number(fit.scale.toPrecision(2))}, rotated by {Math.round(fit.rotation_degrees)}°, by{' '}
-                    {Number(fit.translation_relative.toPrecision(2))} diagonals
-                  </td>
-                </tr>
-              ),
-          )}
           <tr>
             <th scope="row">Time</th>
             <td data-varies>
@@ -342,8 +329,24 @@ export function MorphInspector() {
           ))}
         </tbody>
       </table>
+      <Moved shapes={supermesh.shapes} />
       <OptionsFold />
     </>
+  );
+}
+
+/** What the fit did to each shape that it moved. */
+function Moved({ shapes }: { shapes: Result['supermesh']['shapes'] }) {
+  const moved = shapes.flatMap(({ name, fit }) => (fit && fit.kind !== 'none' ? [{ name, fit }] : []));
+  if (!moved.length) return null;
+  return (
+    <ul class="hint" aria-label="Shapes that the fit moved">
+      {moved.map(({ name, fit }, i) => (
+        <li key={i}>
+          {`Onto ${shapes[0].name}, ${name} was scaled by ${Number(fit.scale.toPrecision(2))}, rotated by ${Math.round(fit.rotation_degrees)}°, and moved by ${Number(fit.translation_relative.toPrecision(2))} diagonals.`}
+        </li>
+      ))}
+    </ul>
   );
 }
 
