@@ -6,6 +6,7 @@ import { readFile } from 'node:fs/promises';
 import { browser, daemon } from './started.mjs';
 import { difference, shot } from './pictures.mjs';
 import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
+import { obj, torus } from '../scenario/support/shapes.mjs';
 
 let axe;
 before(async () => {
@@ -110,6 +111,11 @@ for (const colorScheme of ['light', 'dark'])
     await button(page, 'Help and keys').click();
     found.help = await findings(page);
     await button(page, 'Close').click();
+    const ring = { name: 'ring.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(torus())) };
+    await page.locator('input[type=file]').first().setInputFiles([ring]);
+    await page.locator('.card.refused').waitFor();
+    found.refused = await findings(page);
+    await button(page, 'Remove ring').click();
     await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
     await page.getByText('Options', { exact: true }).click();
     found.shapes = await findings(page);
@@ -138,6 +144,10 @@ for (const colorScheme of ['light', 'dark'])
     await button(page, 'Spheres').click();
     await counted(page.getByText('Certified one to one'), 2, 'spheres');
     found.spheres = await findings(page);
+    const dead = await openPage(browser, daemon.url, { colorScheme, hash: `#m=${'0'.repeat(64)}` });
+    await dead.page.getByRole('alert').waitFor();
+    found.dead = await findings(dead.page);
+    await dead.done();
     assert.deepEqual(found, Object.fromEntries(Object.keys(found).map((key) => [key, []])));
     await done();
   });
