@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/contest.h"
+#include "align/find/contest.h"
 #include "align/find/match.h"
 #include "align/find/params.h"
 #include "align/map/engine/params.h"
@@ -177,7 +177,7 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
       m->of[1].other[0].cost > ORB_FIND_OTHER_BEHIND) {
     return ORB_OK;
   }
-  ORB_TRY(orb_match_other_target(ctx, &m->of[1], 0, &next->target));
+  ORB_TRY(orb_match_target(ctx, &m->of[1], 1, 1, &next->target));
   ORB_TRY(rotate_spheres(ctx, shapes, m->shape_count, options, &next->alignment));
   next->is_open = 1;
   const double *const targets[2] = {NULL, next->target};
@@ -194,11 +194,11 @@ static int next_is_better(const next_match *next, const orb_map_course *best) {
   return next->is_open && !next->course.is_beaten && next->course.bulk - 1 < ORB_FIND_OTHER_GAIN * (best->bulk - 1);
 }
 
-/* Makes the next best match the match; takes over its target. The best match can be wrong although it bends less, since
- * a twisted body can bend less when its limbs are swapped; then only the map shows the mistake. Since bend and map
+/* Makes other match k the match; takes over its target. The best match can be wrong although it bends less, since a
+ * twisted body can bend less when its limbs are swapped; then only the map shows the mistake. Since bend and map
  * disagree, the match counts as unclear. */
-static orb_status choose_next(orb_context *ctx, matches *m, double *target, double clear) {
-  ORB_TRY(orb_match_choose(ctx, &m->of[1], 0, target, clear));
+static orb_status choose_other(orb_context *ctx, matches *m, int32_t k, double *target, double clear) {
+  ORB_TRY(orb_match_choose(ctx, &m->of[1], k, target, clear));
   m->targets[1] = m->of[1].target;
   m->clear = m->of[1].clear;
   m->lead = m->of[1].lead;
@@ -214,7 +214,7 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
   orb_alignment_free(ctx, alignment);
   *alignment = next->alignment;
   memset(next, 0, sizeof *next);
-  return choose_next(ctx, m, target, clear);
+  return choose_other(ctx, m, 0, target, clear);
 }
 
 /* If a match has led to no map, its pairs are pinned. */
@@ -253,19 +253,25 @@ static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shap
   return status;
 }
 
-/* Composes two shapes that bend much towards the better of their two best matches. */
+/* Composes two shapes that bend much towards the best of their matches, as their walks show it. If what fits best in
+ * space leads to a better map, the match counts as unclear. */
 static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_options *options,
                                orb_alignment *alignment) {
-  double *target, clear = 0;
-  ORB_TRY(orb_contest_run(ctx, &m->of[1], options->preset, alignment, &target, &clear));
-  m->targets[1] = m->of[1].target;
-  return target ? choose_next(ctx, m, target, clear) : ORB_OK;
+  orb_contest_result won;
+  ORB_TRY(orb_contest_run(ctx, &m->of[1], options->preset, alignment, &won));
+  if (won.is_space) {
+    m->clear = 0;
+    m->lead = 1;
+  }
+  return won.other > 0 ? choose_other(ctx, m, won.other - 1, NULL, won.clear) : ORB_OK;
 }
 
 /* Computes the targets of all matches. */
 static orb_status aim(orb_context *ctx, matches *m) {
   for (int32_t s = 1; s < m->shape_count; s++) {
-    ORB_TRY(orb_match_aim(ctx, &m->of[s]));
+    if (m->of[s].is_found) {
+      ORB_TRY(orb_match_target(ctx, &m->of[s], 0, 1, &m->of[s].target));
+    }
     m->targets[s] = m->of[s].target;
   }
   return ORB_OK;
@@ -277,8 +283,7 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
                                  const orb_align_options *options, orb_alignment *alignment) {
   const double poor = orb_map_params_of(options->preset).energy.poor;
   if (m->shape_count == 2 && orb_contest_is_open(&m->of[1], m->keep_angles)) {
-    ORB_TRY(hold_contest(ctx, m, options, alignment));
-    return compete_in_space(ctx, shapes, m, options, alignment);
+    return hold_contest(ctx, m, options, alignment);
   }
   next_match next = {0};
   orb_status status;
@@ -287,7 +292,8 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   const orb_aims aims = {.targets = m->targets,
                          .keep_angles = m->keep_angles,
                          .course = m->shape_count == 2 ? &course : NULL, /* only pairs have a next match */
-                         .walks_first = m->bend > ORB_FIND_WALKS_FIRST};
+                         .walks_first = m->bend > ORB_FIND_WALKS_FIRST,
+                         .walks_early = m->bend > ORB_FIND_WALKS_EARLY};
   ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? &aims : NULL, options->preset));
   if (m->shape_count > 2) {
     return pin_poor(ctx, shapes, m, options, alignment);

@@ -56,7 +56,7 @@ typedef struct orb_aims {
   int keep_angles;              /* the spheres of the shapes do */
   orb_map_beat beat;            /* see orb_map_guide */
   orb_map_course *course;       /* see orb_map_guide; that of the last shape */
-  int walks_first;              /* see orb_map_guide */
+  int walks_first, walks_early; /* see orb_map_guide */
 } orb_aims;
 
 /* Improves the maps from the first shape to the others (orb_compose()), since aligned landmarks alone do not make a

@@ -1,8 +1,8 @@
 /* Limits of a context that only core reads.
  *
  * core/base: state.h (the struct of a context), context.c (its life, cancelling, progress), error.c, memory.c,
- * buffer.c, parallel.c (threads), tasks.h (work side by side), loops.h (loops that check for cancellation), check.h (invariants), grow.h, hash.c,
- * clock.c, printf.h (checks of formats), status.c, version.c.
+ * buffer.c, parallel.c (threads), tasks.h (work side by side), loops.h (loops that check for cancellation), check.h
+ * (invariants), grow.h, hash.c, clock.c, printf.h (checks of formats), status.c, version.c.
  */
 #ifndef ORB_BASE_CONTEXT_H
 #define ORB_BASE_CONTEXT_H

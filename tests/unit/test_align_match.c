@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "align/find/match.h"
+#include "base/memory.h"
 #include "support_shapes.h"
 #include "support_shared.h"
 
@@ -50,33 +51,66 @@ static int32_t tip_of(const orb_mesh *mesh, int i, int thirds) {
   return best;
 }
 
-/* Each limb goes to its counterpart for any rotation of the other creature, even though its proportions differ. */
+/* Each limb of the shape that moves goes to its counterpart. thirds: of the second shape. */
+static void assert_limbs(orb_context *ctx, const orb_match *match, const orb_mesh mesh[2], int moving, int thirds) {
+  const orb_mesh *to = &mesh[1 - moving];
+  const int own = moving == 1 ? thirds : 0, others = moving == 1 ? 0 : thirds;
+  double *target;
+  orb_extent extent;
+  orb_mesh_extent(to, &extent);
+  assert_int_equal(orb_match_target(ctx, match, 0, moving, &target), ORB_OK);
+  for (int i = 0; i < LIMBS; i++) {
+    const double *p = to->positions + 3 * (size_t)tip_of(to, i, others),
+                 *q = target + 3 * (size_t)tip_of(&mesh[moving], i, own);
+    double d = 0;
+    for (int k = 0; k < 3; k++) {
+      d += (p[k] - q[k]) * (p[k] - q[k]);
+    }
+    assert_true(sqrt(d) < 0.12 * extent.diagonal);
+  }
+  orb_free(ctx, target);
+}
+
+/* Each limb goes to its counterpart for any rotation of the other creature, even though its proportions differ,
+ * whichever of them moves. */
 static void limbs_go_to_limbs(void **state) {
   (void)state;
   static const double other[LIMBS] = {3.4, 4, 2.5, 2.9, 2.4};
   for (int thirds = 0; thirds < 3; thirds++) {
     orb_context *ctx;
     orb_match match;
-    orb_extent extent;
     assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
-    orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, other, 4, thirds);
-    orb_mesh_extent(&a, &extent);
-    assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
+    orb_mesh mesh[2] = {creature_of(ctx, reach, 3, 0), creature_of(ctx, other, 4, thirds)};
+    assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
     assert_true(match.is_found);
-    for (int i = 0; i < LIMBS; i++) {
-      const double *p = a.positions + 3 * (size_t)tip_of(&a, i, 0),
-                   *q = match.target + 3 * (size_t)tip_of(&b, i, thirds);
-      double d = 0;
-      for (int k = 0; k < 3; k++) {
-        d += (p[k] - q[k]) * (p[k] - q[k]);
-      }
-      assert_true(sqrt(d) < 0.12 * extent.diagonal);
-    }
+    assert_limbs(ctx, &match, mesh, 1, thirds);
+    assert_limbs(ctx, &match, mesh, 0, thirds);
     orb_match_free(ctx, &match);
-    shape_free(ctx, &a);
-    shape_free(ctx, &b);
+    shape_free(ctx, &mesh[0]);
+    shape_free(ctx, &mesh[1]);
     orb_context_destroy(ctx);
   }
+}
+
+/* The shape with long limbs moves, whichever of two comes first; of two that are alike, the second. */
+static void less_round_shape_moves(void **state) {
+  (void)state;
+  static const double stout[LIMBS] = {2, 1.8, 1.7, 1.6, 1.5};
+  orb_context *ctx;
+  orb_match match;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh lean = creature_of(ctx, reach, 3, 0), round = creature_of(ctx, stout, 3, 0);
+  const orb_mesh *const pairs[][2] = {{&lean, &round}, {&round, &lean}, {&lean, &lean}};
+  static const int moves[] = {0, 1, 1};
+  for (int i = 0; i < 3; i++) {
+    assert_int_equal(orb_match_find(ctx, pairs[i][0], pairs[i][1], NULL, &match), ORB_OK);
+    assert_true(match.is_found);
+    assert_int_equal(match.moves, moves[i]);
+    orb_match_free(ctx, &match);
+  }
+  shape_free(ctx, &lean);
+  shape_free(ctx, &round);
+  orb_context_destroy(ctx);
 }
 
 /* The list of maps of a creature with five unlike limbs is sorted by cost, and no two maps pair the same vertices. */
@@ -119,7 +153,8 @@ static void another_map_is_chosen(void **state) {
   assert_in_range(match.other_count, 1, ORB_MATCH_OTHERS);
   const int32_t last = match.other_count - 1;
   const orb_match_pairs best = match.pairs, chosen = match.other[last].pairs;
-  assert_int_equal(orb_match_other_target(ctx, &match, last, &target), ORB_OK);
+  assert_int_equal(orb_match_target(ctx, &match, 0, 1, &match.target), ORB_OK);
+  assert_int_equal(orb_match_target(ctx, &match, 1 + last, 1, &target), ORB_OK);
   assert_memory_not_equal(target, match.target, 3 * (size_t)b.vertex_count * sizeof *target);
   assert_int_equal(orb_match_choose(ctx, &match, last, target, 0.25), ORB_OK);
   assert_ptr_equal(match.target, target);
@@ -280,13 +315,11 @@ static void cow_to_animal(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs),
-                                     cmocka_unit_test(others_differ),
-                                     cmocka_unit_test(another_map_is_chosen),
-                                     cmocka_unit_test(confidence_is_monotone),
-                                     cmocka_unit_test(symmetric_shapes_are_not_sure),
-                                     cmocka_unit_test(a_tie_is_shared),
-                                     cmocka_unit_test(man_to_armadillo),
-                                     cmocka_unit_test(cow_to_animal)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(limbs_go_to_limbs),      cmocka_unit_test(less_round_shape_moves),
+      cmocka_unit_test(others_differ),          cmocka_unit_test(another_map_is_chosen),
+      cmocka_unit_test(confidence_is_monotone), cmocka_unit_test(symmetric_shapes_are_not_sure),
+      cmocka_unit_test(a_tie_is_shared),        cmocka_unit_test(man_to_armadillo),
+      cmocka_unit_test(cow_to_animal)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -360,6 +360,7 @@ static void a_copy_is_matched(void **state) {
   assert_true(match.bend < 0.1); /* wrong limbs bend the same creature more, even on its own mesh: the test above */
   assert_true(match.lead > 2);
   assert_true(match.pairs.count >= 6);
+  assert_int_equal(orb_match_target(ctx, &match, 0, 1, &match.target), ORB_OK);
   for (int32_t v = 0; v < b.vertex_count; v++) {
     const double *p = b.positions + 3 * (size_t)v;
     const double truth[3] = {p[2] / 10, (p[0] - 5) / 10, p[1] / 10};
@@ -391,6 +392,8 @@ static void threads_change_nothing(void **state) {
   assert_memory_equal(one.other, other.other, sizeof one.other);
   assert_memory_equal(&one.cost, &other.cost, sizeof one.cost);
   assert_memory_equal(&one.clear, &other.clear, sizeof one.clear);
+  assert_int_equal(orb_match_target(ctx, &one, 0, 1, &one.target), ORB_OK);
+  assert_int_equal(orb_match_target(three, &other, 0, 1, &other.target), ORB_OK);
   assert_memory_equal(one.target, other.target, 3 * (size_t)b.vertex_count * sizeof *one.target);
   orb_match_free(ctx, &one);
   orb_match_free(three, &other);
@@ -406,6 +409,7 @@ static void few_vertices_are_matched_by_rotations(void **state) {
   orb_match match;
   assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
   assert_true(match.is_found);
+  assert_int_equal(orb_match_target(ctx, &match, 0, 1, &match.target), ORB_OK);
   for (int32_t i = 0; i < 3 * b.vertex_count; i++) {
     assert_true(isfinite(match.target[i]));
   }

@@ -101,40 +101,55 @@ end:
   return status;
 }
 
-/* Settles the fine copy of the second shape on that of the first, and carries its pose to all vertices. */
-static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial *one, double **target) {
-  const orb_coarse_copy *fine = t->fine;
+/* Settles the fine copy of shape s on that of the other one, and carries its pose to all vertices. Landmarks draw the
+ * second shape only. */
+static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial *one, int s, double **target) {
+  const orb_mesh *fine = &t->fine[s].mesh, *mesh = t->mesh[s];
+  const orb_trial_scaling *own = &t->scaling[s], *other = &t->scaling[1 - s];
   orb_elastic_pose pose = {NULL, NULL}, all = {NULL, NULL};
   orb_elastic_anchor *anchors = NULL;
-  size_t count = 3 * (size_t)t->mesh[1]->vertex_count;
+  orb_elastic_anchors held = {0, NULL};
+  size_t count = 3 * (size_t)mesh->vertex_count;
   double *points = ORB_NEW(ctx, double, count);
   orb_status status = ORB_E_NO_MEMORY;
   all.position = *target = ORB_NEW(ctx, double, count);
   if (!points || !all.position) {
     goto end;
   }
-  ORB_GO(status, orb_trial_pose_create(ctx, &fine[1].mesh, &pose), end);
-  ORB_GO(status, draw_to_landmarks(ctx, t, one), end);
-  ORB_GO(status,
-         orb_elastic_carry(ctx, &t->copy[1].mesh, &one->pose[1], fine[1].mesh.positions, fine[1].mesh.vertex_count,
-                           &pose),
-         end);
-  ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, &fine[1].mesh, &anchors), end);
-  const orb_elastic_anchors held = {t->hint.count, anchors};
-  const int rounds = (one->bend[0] + one->bend[1]) / 2 > ORB_FIND_WALKS_FIRST ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
-  ORB_GO(status, orb_elastic_settle(ctx, &fine[1].mesh, &fine[0].mesh, &held, rounds, &pose), end);
-  for (size_t i = 0; i < count; i++) {
-    points[i] = (t->mesh[1]->positions[i] - t->scaling[1].middle[i % 3]) * t->scaling[1].scale;
+  ORB_GO(status, orb_trial_pose_create(ctx, fine, &pose), end);
+  if (s == 1) {
+    ORB_GO(status, draw_to_landmarks(ctx, t, one), end);
+    ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, fine, &anchors), end);
+    held = (orb_elastic_anchors){t->hint.count, anchors};
   }
-  ORB_GO(status, orb_elastic_carry(ctx, &fine[1].mesh, &pose, points, t->mesh[1]->vertex_count, &all), end);
+  ORB_GO(status, orb_elastic_carry(ctx, &t->copy[s].mesh, &one->pose[s], fine->positions, fine->vertex_count, &pose),
+         end);
+  const int rounds = (one->bend[0] + one->bend[1]) / 2 > ORB_FIND_WALKS_FIRST ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
+  ORB_GO(status, orb_elastic_settle(ctx, fine, &t->fine[1 - s].mesh, &held, rounds, &pose), end);
   for (size_t i = 0; i < count; i++) {
-    all.position[i] = all.position[i] / t->scaling[0].scale + t->scaling[0].middle[i % 3];
+    points[i] = (mesh->positions[i] - own->middle[i % 3]) * own->scale;
+  }
+  ORB_GO(status, orb_elastic_carry(ctx, fine, &pose, points, mesh->vertex_count, &all), end);
+  for (size_t i = 0; i < count; i++) {
+    all.position[i] = all.position[i] / other->scale + other->middle[i % 3];
   }
 end:
   orb_free(ctx, points);
   orb_free(ctx, anchors);
   orb_trial_pose_free(ctx, &pose);
   return status;
+}
+
+/* How round a copy is: its volume, relative to a ball of its area. */
+static double roundness(const orb_mesh *copy) {
+  double volume = 0;
+  for (int32_t t = 0; t < copy->triangle_count; t++) {
+    const int32_t *v = copy->triangles + 3 * (size_t)t;
+    double n[3];
+    orb_cross(copy->positions + 3 * (size_t)v[0], copy->positions + 3 * (size_t)v[1], n);
+    volume += orb_dot(n, copy->positions + 3 * (size_t)v[2]) / 6;
+  }
+  return fabs(volume) / (4 * M_PI / 3);
 }
 
 /* Places the landmarks on the copies. *stretch: see orb_hint_stretch(). */
@@ -188,6 +203,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     return ORB_OK;
   }
   out->is_found = 1;
+  out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;
   orb_trials_list(t);
   ORB_TRY(write_ranking(t, out));
   return orb_trials_refine(t);
@@ -200,20 +216,15 @@ orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mes
   return out->trials ? run(ctx, first, second, hint, out) : ORB_E_NO_MEMORY;
 }
 
-orb_status orb_match_aim(orb_context *ctx, orb_match *match) {
+orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving, double **target) {
   orb_trials *t = match->trials;
-  return match->is_found && !match->target ? write_targets(ctx, t, &t->trial[t->list[0]], &match->target) : ORB_OK;
-}
-
-orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target) {
-  orb_trials *t = match->trials;
-  orb_trial *one = &t->trial[t->list[1 + k]];
-  ORB_ASSERT(k < match->other_count);
+  orb_trial *one = &t->trial[t->list[n]];
+  ORB_ASSERT(match->is_found && n <= match->other_count);
   *target = NULL;
   if (!(one->cost < INFINITY)) { /* it was dropped before its way back was registered */
-    ORB_TRY(orb_trials_complete(ctx, t, t->list[1 + k]));
+    ORB_TRY(orb_trials_complete(ctx, t, t->list[n]));
   }
-  return write_targets(ctx, t, one, target);
+  return write_targets(ctx, t, one, moving, target);
 }
 
 orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear) {

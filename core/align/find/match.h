@@ -15,11 +15,11 @@
  * limbs bends the copies least, even if it is off at their tips. A twin (left and right swapped with front and back)
  * bends them more, and often also rotates them in space.
  *
- * Where shapes bend much, neither is sure, and the walks towards the two best matches decide (align/contest.h).
+ * Where shapes bend much, neither is sure, and the walks towards the two best matches decide (contest.h).
  *
- * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on the
- * course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by no
- * more than that. */
+ * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on
+ * the course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by
+ * no more than that. */
 #ifndef ORB_ALIGN_FIND_MATCH_H
 #define ORB_ALIGN_FIND_MATCH_H
 
@@ -51,12 +51,14 @@ typedef struct orb_match {
   double clear;  /* 0 to 1: how far the next best map that differs is behind */
   double lead;   /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
                     half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
+  int moves; /* which shape moves in walks: the second (1), unless the first (0) is clearly less round. Limbs that move
+                stretch to where they go; limbs that stay are left out by the triangles of a round shape, and its energy
+                does not show it */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  double *target;     /* where each vertex of the second shape lies on the first one, in its space: 3 per vertex; NULL
-                         before orb_match_aim() */
-  orb_trials *trials; /* the candidates, for the functions below */
+  double *target;                          /* the caller's to set with orb_match_target(); freed with the match */
+  orb_trials *trials;                      /* the candidates, for the functions below */
 } orb_match;
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
@@ -65,15 +67,14 @@ typedef struct orb_match {
  * result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
-/* Computes the target of the best map, if there is one and it is not there. About 0.1 s of one thread. It may run beside
- * orb_match_other_target(). */
-ORB_MUST_CHECK orb_status orb_match_aim(orb_context *ctx, orb_match *match);
-/* Computes the target of other[k], which the caller frees, also on failure. The meshes of the match must still exist.
- * About 0.2 s of one thread. */
-ORB_MUST_CHECK orb_status orb_match_other_target(orb_context *ctx, const orb_match *match, int32_t k, double **target);
-/* Makes other[k] the best map; the former best map becomes the first of the others. target: that of other[k]; the match
- * takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that decided.
- * Sets lead to 1, because the bends contradict the choice. */
+/* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
+ * other[n − 1]. moving: 0, the first shape, or 1, the second. The caller frees *target, also on failure. The meshes of
+ * the match must still exist. Several targets may be computed side by side. About 0.1 s of one thread. */
+ORB_MUST_CHECK orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving,
+                                           double **target);
+/* Makes other[k] the best map; the former best map becomes the first of the others. target: NULL, or that of other[k];
+ * the match takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that
+ * decided. Sets lead to 1, because the bends contradict the choice. */
 ORB_MUST_CHECK orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear);
 /* The confidence in a match, 0 to 1, from its bend, its `clear`, its `lead` and the energy of the map that followed it:
  * calibrated from 0.8 on (docs/bench-confidence.md). */

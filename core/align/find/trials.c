@@ -331,8 +331,8 @@ void orb_trials_list(orb_trials *t) {
 
 orb_status orb_trials_complete(orb_context *ctx, orb_trials *t, int32_t number) {
   orb_trial *one = &t->trial[number];
-  ORB_TRY(orb_elastic_register(ctx, &t->copy[1].mesh, &t->copy[0].mesh, &one->map[1], NULL, &one->pose[1],
-                               &one->bend[1]));
+  ORB_TRY(
+      orb_elastic_register(ctx, &t->copy[1].mesh, &t->copy[0].mesh, &one->map[1], NULL, &one->pose[1], &one->bend[1]));
   fill_cost(t, one, 2);
   return ORB_OK;
 }

@@ -142,9 +142,9 @@ static orb_status compose_posed(contest *c, int32_t s, double sure, int keeps_an
                                .stretch = ORB_FIND_HINT_STRETCH_MOST,
                                .sure = sure};
   ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match), done);
-  ORB_GO(status, orb_match_aim(ctx, &match), done);
   p->is_unsure |= match.is_unsure;
   if (match.is_found) {
+    ORB_GO(status, orb_match_target(ctx, &match, 0, 1, &match.target), done);
     const int walks_first = competes && match.bend > ORB_FIND_WALKS_FIRST;
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE,
                                  .target = match.target,

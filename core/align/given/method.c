@@ -97,7 +97,8 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
                                  .keeps_angles = aims->keep_angles,
                                  .beat = aims->beat,
                                  .course = aims->course,
-                                 .walks_first = aims->walks_first};
+                                 .walks_first = aims->walks_first,
+                                 .walks_early = aims->walks_early};
     double energy[2];
     int improved;
     int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || aims->targets);

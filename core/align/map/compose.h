@@ -35,17 +35,23 @@ ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed
 
 /* A map of two shapes towards spatial targets of which only the landmark walks are made, on a coarse level. Several
  * drafts of the same shapes may be made side by side, and the best one finished. */
-typedef struct orb_draft orb_draft;
+typedef struct orb_map_draft orb_map_draft;
 
-/* As orb_compose() with a target, `both` and walks_first, without landmarks, up to the walks. *energy: that of the best
- * walk; INFINITY if none leads to a map. The shapes stay as they are, and must until the draft is freed, except by
- * orb_draft_finish(); so must the target. Free the draft in any case. */
-ORB_MUST_CHECK orb_status orb_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving,
-                                           const double *target, int keeps_angles, orb_preset preset, orb_draft **out,
-                                           double *energy);
-/* Does what is left of orb_compose(), once, on any context of the same root. *energy: of the map afterwards. */
-ORB_MUST_CHECK orb_status orb_draft_finish(orb_context *ctx, orb_draft *draft, double *energy);
-void orb_draft_free(orb_context *ctx, orb_draft *draft);
+/* As orb_compose() with a target, `both` and walks_first, without landmarks, on spheres that keep angles, up to the
+ * walks. target: NULL for what fits
+ * best in space. known: the energy of the best walk of other drafts, or INFINITY; with it, fewer walks are tried.
+ * *energy: that of the best walk; INFINITY if none leads to a map. The shapes stay as they are, and must until the
+ * draft is freed, except by orb_map_draft_finish(); so must the target. Free the draft in any case. */
+ORB_MUST_CHECK orb_status orb_map_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving,
+                                               const double *target, double known, orb_preset preset,
+                                               orb_map_draft **out, double *energy);
+/* Makes the map of a draft with all vertices, once, on any context of the same root. *energy: of the map, or that of
+ * the shapes as they are if it is no better. The shapes stay as they are. */
+ORB_MUST_CHECK orb_status orb_map_draft_finish(orb_context *ctx, orb_map_draft *draft, double *energy);
+/* Untwists limbs of a finished draft, and writes its map to the shapes, as orb_compose() does. *energy: of the map
+ * afterwards. */
+ORB_MUST_CHECK orb_status orb_map_draft_take(orb_context *ctx, orb_map_draft *draft, double *energy);
+void orb_map_draft_free(orb_context *ctx, orb_map_draft *draft);
 
 /* The energy of the map as given. O(vertices) and a location for each. */
 ORB_MUST_CHECK orb_status orb_compose_energy(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving,

@@ -102,7 +102,8 @@ static orb_status start_guided(orb_map_run *c) {
   } else {
     ORB_GO(status, orb_map_walked_improve(c, &best), done);
   }
-  if (best.energy < c->best_energy && !(c->beat.energy > 0 && best.energy >= c->beat.energy)) {
+  if (best.energy < c->params.walked.refines * c->best_energy &&
+      !(c->beat.energy > 0 && best.energy >= c->beat.energy)) {
     allow(c);
     ORB_GO(status, orb_map_walked_refine(c, &best), done);
   }
@@ -179,8 +180,8 @@ static orb_status improve_walked(orb_map_run *c) {
   return c->best_energy > good_energy(c) && c->best_energy <= c->params.energy.poor ? run_passes(c) : ORB_OK;
 }
 
-/* A walk, if all starts have led to no map of shapes that correspond. *walked: it leads to the best map. */
-static orb_status walk_last(orb_map_run *c, int *walked) {
+/* A walk, if starts have led to no map of shapes that correspond. *walked: it leads to the best map. */
+static orb_status walk_towards(orb_map_run *c, int *walked) {
   const double before = c->best_energy;
   ORB_TRY(orb_map_register(c, 0));
   ORB_TRY(start_guided(c));
@@ -217,13 +218,19 @@ orb_status orb_map_follow_targets(orb_map_run *c) {
   if (c->course.is_beaten) {
     return ORB_OK;
   }
+  if (!walked && c->walks_early && c->best_energy > c->params.targets.walked) {
+    ORB_TRY(walk_towards(c, &walked));
+    if (!walked && c->starts_smooth) {
+      ORB_TRY(smooth_targets(c));
+    }
+  }
   if (!walked) {
     ORB_TRY(run_starts(c));
     if (c->course.is_beaten) {
       return ORB_OK;
     }
-    if (c->both && !c->walks_first && c->best_energy > c->params.targets.walked) {
-      ORB_TRY(walk_last(c, &walked));
+    if (c->both && !c->walks_first && !c->walks_early && c->best_energy > c->params.targets.walked) {
+      ORB_TRY(walk_towards(c, &walked));
     }
   }
   return walked ? improve_walked(c) : improve_started(c);

@@ -65,6 +65,7 @@ typedef struct orb_map_guide {
   orb_map_rival rival;    /* with a target: asked if the first start has led to no good map */
   int walks_first; /* with a target and `both`: a walk is tried before the start from the targets, and in its place
                     where it leads to a map */
+  int walks_early; /* with a target and `both`: if the first start leads to a poor map, a walk comes next, not last */
   orb_map_springs springs; /* with ORB_MAP_FROM_PINS, ORB_MAP_FROM_SPRINGS and ORB_MAP_FROM_COPY */
   orb_map_level_map copy;  /* with ORB_MAP_FROM_COPY */
 } orb_map_guide;

@@ -55,6 +55,7 @@ static const orb_map_params DEFAULTS = {
                .guides = {18, 50, -25, -35, 25, -18},
                .few = {6, 4},
                .enough = 1.4,
+               .refines = 1.1,
                .beat_most = 2,
                .agree = 0.1},
     .sweep = {.still = 1e-3, .still_share = 500, .over = 1.5},

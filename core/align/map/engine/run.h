@@ -43,23 +43,23 @@ typedef struct orb_map_run {
   orb_aligned_shape *moving;
   int32_t vertex_count, landmark_count;
   orb_map_pairs pairs;
-  orb_map_samples samples;    /* by eigenfunctions */
-  orb_map_springs springs;    /* the caller's */
-  int both;                   /* the fixed shape's points on the sphere may change too */
-  double *fixed_points;       /* what they are now; NULL: as given */
-  orb_map_candidate kept;     /* the best map from before they changed */
-  double *x, *normal;         /* moving shape, area 4π */
-  int keeps_angles;           /* see orb_map_guide */
-  orb_map_beat beat;          /* see orb_map_guide */
-  orb_map_rival rival;        /* see orb_map_guide */
-  int walks_first;            /* see orb_map_guide */
+  orb_map_samples samples;        /* by eigenfunctions */
+  orb_map_springs springs;        /* the caller's */
+  int both;                       /* the fixed shape's points on the sphere may change too */
+  double *fixed_points;           /* what they are now; NULL: as given */
+  orb_map_candidate kept;         /* the best map from before they changed */
+  double *x, *normal;             /* moving shape, area 4π */
+  int keeps_angles;               /* see orb_map_guide */
+  orb_map_beat beat;              /* see orb_map_guide */
+  orb_map_rival rival;            /* see orb_map_guide */
+  int walks_first, walks_early;   /* see orb_map_guide */
   struct orb_map_walked *drafted; /* NULL, or the walks towards the targets, which were made beforehand (targets.h) */
-  orb_map_course course;      /* see orb_map_guide; its bulks are measured only if asked for */
-  int wants_course;           /* whether they are asked for */
-  const double *given_target; /* for registrations without samples, in the fixed shape's space; NULL: computed */
-  int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
-  int starts_smooth;          /* the first start from given targets has followed smoothed ones */
-  double *target;             /* spatial targets, once the moving shape is registered */
+  orb_map_course course;          /* see orb_map_guide; its bulks are measured only if asked for */
+  int wants_course;               /* whether they are asked for */
+  const double *given_target;     /* for registrations without samples, in the fixed shape's space; NULL: computed */
+  int samples_follow_target;      /* samples of a registration have their targets from there, not from the best map */
+  int starts_smooth;              /* the first start from given targets has followed smoothed ones */
+  double *target;                 /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
   unsigned char *doubted;  /* vertices whose target_place faces another way: the first level of a start smooths them */

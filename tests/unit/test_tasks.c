@@ -1,0 +1,179 @@
+/* Tasks that run side by side: each once, on a part of the context that shares its budget, cancel flag and progress,
+ * and has an error of its own. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/tasks.h"
+#include "orbmorph/context.h"
+
+enum { TASKS = 5, INNER = 3, MOST = 1000 };
+
+static const int threads_tried[] = {1, 2, 3, 8};
+
+static orb_context *context_of(int threads, size_t memory) {
+  const orb_context_options options = {.threads = threads, .memory_limit = memory};
+  orb_context *made;
+  assert_int_equal(orb_context_create(&options, &made), ORB_OK);
+  return made;
+}
+
+typedef struct work {
+  int64_t square[MOST];
+  int64_t sum[INNER];
+  atomic_int times;
+} work;
+
+static void fill_squares(void *arg, int64_t begin, int64_t end, int thread) {
+  work *w = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    w->square[i] = i * i;
+  }
+}
+
+static orb_status add_third(orb_context *ctx, void *arg, int32_t task) {
+  work *w = arg;
+  for (int64_t i = task; i < MOST; i += INNER) {
+    w->sum[task] += w->square[i];
+  }
+  return orb_context_check(ctx);
+}
+
+/* A loop, and tasks within the task. */
+static orb_status do_work(orb_context *ctx, void *arg, int32_t task) {
+  work *w = (work *)arg + task;
+  atomic_fetch_add(&w->times, 1);
+  orb_parallel_for(ctx, MOST, 7, fill_squares, w);
+  return orb_tasks_run(ctx, INNER, add_third, w);
+}
+
+static void each_task_once(void **unused) {
+  static work all[TASKS];
+  (void)unused;
+  for (size_t t = 0; t < sizeof threads_tried / sizeof *threads_tried; t++) {
+    orb_context *ctx = context_of(threads_tried[t], 0);
+    memset(all, 0, sizeof all);
+    assert_int_equal(orb_tasks_run(ctx, TASKS, do_work, all), ORB_OK);
+    for (int i = 0; i < TASKS; i++) {
+      assert_int_equal(atomic_load(&all[i].times), 1);
+      assert_int_equal(all[i].sum[0] + all[i].sum[1] + all[i].sum[2],
+                       (int64_t)(MOST - 1) * MOST * (2 * MOST - 1) / 6); /* of the squares below MOST */
+    }
+    orb_context_destroy(ctx);
+  }
+}
+
+/* Task 0 recovers from an error, as searches do; tasks 2 and 4 fail. */
+static orb_status fail_some(orb_context *ctx, void *arg, int32_t task) {
+  (void)arg;
+  if (task == 0) {
+    assert_int_equal(orb_fail(ctx, ORB_E_NOT_CERTIFIED, "This one is forgotten."), ORB_E_NOT_CERTIFIED);
+    orb_error_clear(ctx);
+    return ORB_OK;
+  }
+  return task % 2 == 0 ? orb_fail(ctx, ORB_E_BAD_OPTION, "Task %d has failed.", task) : ORB_OK;
+}
+
+static void first_failure_is_told(void **unused) {
+  (void)unused;
+  for (size_t t = 0; t < sizeof threads_tried / sizeof *threads_tried; t++) {
+    orb_context *ctx = context_of(threads_tried[t], 0);
+    assert_int_equal(orb_tasks_run(ctx, TASKS, fail_some, NULL), ORB_E_BAD_OPTION);
+    assert_int_equal(orb_context_error(ctx)->status, ORB_E_BAD_OPTION);
+    assert_string_equal(orb_context_error(ctx)->detail, "Task 2 has failed.");
+    orb_context_destroy(ctx);
+  }
+}
+
+static orb_status leave_behind(orb_context *ctx, void *arg, int32_t task) {
+  char **left = arg;
+  left[task] = ORB_NEW(ctx, char, 100000);
+  return left[task] ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+static void budget_is_shared(void **unused) {
+  (void)unused;
+  for (size_t t = 0; t < sizeof threads_tried / sizeof *threads_tried; t++) {
+    char *left[TASKS] = {NULL};
+    orb_context *ctx = context_of(threads_tried[t], 0);
+    assert_int_equal(orb_tasks_run(ctx, TASKS, leave_behind, left), ORB_OK);
+    assert_in_range(orb_memory_used(ctx), TASKS * 100000, TASKS * 100000 + (1 << 20));
+    for (int i = 0; i < TASKS; i++) {
+      orb_free(ctx, left[i]);
+    }
+    orb_context_destroy(ctx); /* asserts that all is freed */
+    memset(left, 0, sizeof left);
+    ctx = context_of(threads_tried[t], 450000); /* less than the tasks leave behind; a part of a context takes 300 KB */
+    assert_int_equal(orb_tasks_run(ctx, TASKS, leave_behind, left), ORB_E_NO_MEMORY);
+    assert_non_null(strstr(orb_context_error(ctx)->detail, "memory budget of 450000 bytes"));
+    for (int i = 0; i < TASKS; i++) {
+      orb_free(ctx, left[i]);
+    }
+    orb_context_destroy(ctx);
+  }
+}
+
+static orb_status check(orb_context *ctx, void *arg, int32_t task) {
+  atomic_int *checks = arg;
+  atomic_fetch_add(checks, 1);
+  if (task == 0) {
+    orb_context_cancel(ctx);
+  }
+  return orb_context_check(ctx);
+}
+
+static void cancelling_reaches_all(void **unused) {
+  (void)unused;
+  for (size_t t = 0; t < sizeof threads_tried / sizeof *threads_tried; t++) {
+    atomic_int checks = 0;
+    orb_context *ctx = context_of(threads_tried[t], 0);
+    assert_int_equal(orb_tasks_run(ctx, TASKS, check, &checks), ORB_E_CANCELLED);
+    assert_int_equal(orb_context_check(ctx), ORB_E_CANCELLED);
+    orb_context_destroy(ctx);
+  }
+}
+
+static void count_report(void *user, const char *stage, double fraction) {
+  int *reports = user;
+  assert_string_equal(stage, "align");
+  assert_true(fraction == 0.5);
+  ++*reports; /* reports do not overlap */
+}
+
+static orb_status report(orb_context *ctx, void *arg, int32_t task) {
+  (void)arg;
+  (void)task;
+  orb_progress(ctx, "align", 0.5);
+  return ORB_OK;
+}
+
+static void progress_is_the_callers(void **unused) {
+  (void)unused;
+  for (size_t t = 0; t < sizeof threads_tried / sizeof *threads_tried; t++) {
+    int reports = 0;
+    const orb_context_options options = {
+        .threads = threads_tried[t], .progress = count_report, .progress_user = &reports};
+    orb_context *ctx;
+    assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+    assert_int_equal(orb_tasks_run(ctx, TASKS, report, NULL), ORB_OK);
+    assert_in_range(reports, 1, TASKS); /* one that collides with another is dropped */
+    orb_context_destroy(ctx);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(each_task_once), cmocka_unit_test(first_failure_is_told),
+                                     cmocka_unit_test(budget_is_shared), cmocka_unit_test(cancelling_reaches_all),
+                                     cmocka_unit_test(progress_is_the_callers)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
