@@ -2,7 +2,8 @@
  *
  * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
  * (find/match.c), and the composed map goes to the targets of its match. If that gives no good map of two shapes, the
- * next best match is tried, and then what fits best in space. If it gives none of more shapes, pairs of the matches are
+ * next best match is tried, and then what fits best in space. Two shapes that bend much hold a contest of their matches
+ * instead (find/contest.h). If it gives none of more shapes, pairs of the matches are
  * pinned as landmarks, and the map is composed with the pairs held and then without them. The alignment of least energy
  * is returned. The preset `fast` only searches for rotations of the given spheres.
  */
@@ -178,6 +179,9 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
     return ORB_OK;
   }
   ORB_TRY(orb_match_target(ctx, &m->of[1], 1, 1, &next->target));
+  if (!next->target) {
+    return ORB_OK;
+  }
   ORB_TRY(rotate_spheres(ctx, shapes, m->shape_count, options, &next->alignment));
   next->is_open = 1;
   const double *const targets[2] = {NULL, next->target};
@@ -185,7 +189,7 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
                          .keep_angles = m->keep_angles,
                          .beat = {.bulk = best->first_bulk, .energy = energy},
                          .course = &next->course,
-                         .walks_first = best->is_walked || m->bend * m->of[1].other[0].cost > ORB_FIND_WALKS_FIRST};
+                         .walks_first = m->bend * m->of[1].other[0].cost > ORB_FIND_WALKS_FIRST};
   return orb_compose_all(ctx, &next->alignment, ORB_MAP_FROM_SPACE, &aims, options->preset);
 }
 
@@ -277,8 +281,8 @@ static orb_status aim(orb_context *ctx, matches *m) {
   return ORB_OK;
 }
 
-/* Composes a rotated alignment towards the matches. If that leads to no good map, continues with the next best match of
- * two shapes, or pins pairs of the matches of more. */
+/* Composes a rotated alignment towards the matches. Two shapes that bend much hold a contest. If all others lead to no
+ * good map, continues with the next best match of two shapes, or pins pairs of the matches of more. */
 static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, matches *m,
                                  const orb_align_options *options, orb_alignment *alignment) {
   const double poor = orb_map_params_of(options->preset).energy.poor;

@@ -10,9 +10,9 @@
  * chunks only: a thread that has not begun one delays nobody, however late a busy machine runs it. No lock is taken on
  * the way, except to sleep and to wake a sleeper.
  *
- * The pool shares a loop only if that is likely to pay. It remembers how long an iteration of each body took. A loop
- * that should end sooner than it takes to wake a thread runs in the caller, which watches the clock and shares the rest
- * of a loop that turns out to be long.
+ * The pool shares a loop only if that is likely to pay, except for tasks (orb_parallel_each()). It remembers how long
+ * an iteration of each body took. A loop that should end sooner than it takes to wake a thread runs in the caller,
+ * which watches the clock and shares the rest of a loop that turns out to be long.
  *
  * Threads spin for a short while before they sleep. If a thread spins in vain, it spins half as long the next time; so
  * on a busy machine, where spinning only uses up the job's share, threads soon stop spinning. If some threads cannot be

@@ -72,8 +72,10 @@ done
 workers=$(pgrep -P "$zygote") # of jobs and of checks
 [ -n "$workers" ]
 for pid in "$daemon" $workers; do
-  [ "$(says "$pid" CapEff)" = 0000000000000000 ] && [ "$(says "$pid" CapBnd)" = 0000000000000000 ]
-  [ "$(says "$pid" NoNewPrivs)" = 1 ] && [ "$(says "$pid" Seccomp)" = 2 ]
+  [ "$(says "$pid" CapEff)" = 0000000000000000 ]
+  [ "$(says "$pid" CapBnd)" = 0000000000000000 ]
+  [ "$(says "$pid" NoNewPrivs)" = 1 ]
+  [ "$(says "$pid" Seccomp)" = 2 ]
   [ "$(says "$pid" Uid | cut -f1)" = "$owner" ]
 done
 # These processes have their own filter in addition to the container's.

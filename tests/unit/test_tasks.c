@@ -16,7 +16,8 @@
 #include "base/tasks.h"
 #include "orbmorph/context.h"
 
-enum { TASKS = 5, INNER = 3, MOST = 1000 };
+/* LEFT: bytes that a task leaves behind, more than all parts of a context take together. */
+enum { TASKS = 5, INNER = 3, MOST = 1000, LEFT = 10000000 };
 
 static const int threads_tried[] = {1, 2, 3, 8};
 
@@ -77,9 +78,9 @@ static void each_task_once(void **unused) {
 static orb_status fail_some(orb_context *ctx, void *arg, int32_t task) {
   (void)arg;
   if (task == 0) {
-    assert_int_equal(orb_fail(ctx, ORB_E_NOT_CERTIFIED, "This one is forgotten."), ORB_E_NOT_CERTIFIED);
+    orb_status status = orb_fail(ctx, ORB_E_NOT_CERTIFIED, "This one is forgotten.");
     orb_error_clear(ctx);
-    return ORB_OK;
+    return status == ORB_E_NOT_CERTIFIED ? ORB_OK : ORB_E_INTERNAL;
   }
   return task % 2 == 0 ? orb_fail(ctx, ORB_E_BAD_OPTION, "Task %d has failed.", task) : ORB_OK;
 }
@@ -97,7 +98,7 @@ static void first_failure_is_told(void **unused) {
 
 static orb_status leave_behind(orb_context *ctx, void *arg, int32_t task) {
   char **left = arg;
-  left[task] = ORB_NEW(ctx, char, 100000);
+  left[task] = ORB_NEW(ctx, char, LEFT);
   return left[task] ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
@@ -107,18 +108,21 @@ static void budget_is_shared(void **unused) {
     char *left[TASKS] = {NULL};
     orb_context *ctx = context_of(threads_tried[t], 0);
     assert_int_equal(orb_tasks_run(ctx, TASKS, leave_behind, left), ORB_OK);
-    assert_in_range(orb_memory_used(ctx), TASKS * 100000, TASKS * 100000 + (1 << 20));
+    assert_in_range(orb_memory_used(ctx), TASKS * LEFT, (TASKS + 1) * LEFT);
     for (int i = 0; i < TASKS; i++) {
       orb_free(ctx, left[i]);
     }
     orb_context_destroy(ctx); /* asserts that all is freed */
     memset(left, 0, sizeof left);
-    ctx = context_of(threads_tried[t], 450000); /* less than the tasks leave behind; a part of a context takes 300 KB */
+    ctx = context_of(threads_tried[t], (size_t)TASKS * LEFT - 1); /* one task too many, whichever comes last */
     assert_int_equal(orb_tasks_run(ctx, TASKS, leave_behind, left), ORB_E_NO_MEMORY);
-    assert_non_null(strstr(orb_context_error(ctx)->detail, "memory budget of 450000 bytes"));
+    assert_non_null(strstr(orb_context_error(ctx)->detail, "memory budget of 49999999 bytes"));
+    int made = 0;
     for (int i = 0; i < TASKS; i++) {
+      made += left[i] != NULL;
       orb_free(ctx, left[i]);
     }
+    assert_in_range(made, TASKS - 2, TASKS - 1);
     orb_context_destroy(ctx);
   }
 }
@@ -144,10 +148,8 @@ static void cancelling_reaches_all(void **unused) {
 }
 
 static void count_report(void *user, const char *stage, double fraction) {
-  int *reports = user;
-  assert_string_equal(stage, "align");
-  assert_true(fraction == 0.5);
-  ++*reports; /* reports do not overlap */
+  int *reports = user; /* reports do not overlap */
+  *reports += strcmp(stage, "align") == 0 && fraction == 0.5 ? 1 : 100;
 }
 
 static orb_status report(orb_context *ctx, void *arg, int32_t task) {

@@ -18,10 +18,10 @@ typedef struct contest {
   orb_preset preset;
   double *target[MOST]; /* of the matches */
   orb_map_draft *draft[MOST];
-  double energy[MOST];        /* of walks, then of maps; INFINITY: not walked, or none leads to a map */
+  double energy[MOST];        /* of walks, then of finished maps; INFINITY: not walked, or none leads to a map */
   double known;               /* energy of the best walk of an earlier round, or INFINITY */
-  double walked;              /* of the best match's walk */
-  int32_t round[MOST], count; /* those that walk at once */
+  double walked[MOST];        /* energy of walks */
+  int32_t round[MOST], count; /* those that walk, and later those that are finished, side by side */
 } contest;
 
 int orb_contest_is_open(const orb_match *match, int keep_angles) {
@@ -29,19 +29,28 @@ int orb_contest_is_open(const orb_match *match, int keep_angles) {
          match->other[0].cost <= ORB_FIND_OTHER_BEHIND;
 }
 
+/* Which shape moves: that of the match, unless it is too large. */
+static int moving_of(const contest *c) {
+  const int32_t large = orb_map_params_of(c->preset).copies.large;
+  return c->match->moves == 0 && c->alignment->shapes[0].mesh.vertex_count <= large ? 0 : 1;
+}
+
 static orb_status walk(orb_context *ctx, void *arg, int32_t i) {
   contest *c = arg;
   const int32_t n = c->round[i];
-  const int moving = c->match->moves;
+  const int moving = moving_of(c);
   orb_aligned_shape *shapes = c->alignment->shapes;
   if (n != SPACE) {
     ORB_TRY(orb_match_target(ctx, c->match, n, moving, &c->target[n]));
+    if (!c->target[n]) {
+      return ORB_OK;
+    }
   }
   return orb_map_draft_create(ctx, &shapes[1 - moving], &shapes[moving], c->target[n], c->known, c->preset,
                               &c->draft[n], &c->energy[n]);
 }
 
-/* What a map exceeds 1 by, times the root of how many times as much its match bends the shapes as the best one. */
+/* By how much the energy exceeds 1, times √(cost of the match relative to the best one). */
 static double score(const contest *c, int32_t n) {
   const double cost = n == SECOND || n == THIRD ? c->match->other[n - SECOND].cost : 1;
   return c->energy[n] < INFINITY ? (c->energy[n] - 1) * sqrt(cost) : INFINITY;
@@ -58,7 +67,22 @@ static int32_t least_of(const contest *c, int32_t omit) {
   return least;
 }
 
-/* The two best matches walk first; the third one and what fits best in space do as well if these come to poor maps. */
+static void drop(orb_context *ctx, contest *c, int32_t n) {
+  orb_map_draft_free(ctx, c->draft[n]);
+  c->draft[n] = NULL;
+}
+
+/* Frees the worse of the first two drafts, unless it is close: each holds a copy of the surfaces. */
+static void drop_worse(orb_context *ctx, contest *c) {
+  const int32_t worse = score(c, SECOND) < score(c, BEST) ? BEST : SECOND;
+  if (score(c, worse) > ORB_FIND_CONTEST_CLOSE * score(c, SECOND - worse)) {
+    drop(ctx, c, worse);
+    c->walked[worse] = c->energy[worse];
+    c->energy[worse] = INFINITY;
+  }
+}
+
+/* The two best matches walk first. If both walks are poor, the third match and what fits best in space walk too. */
 static orb_status walk_all(orb_context *ctx, contest *c) {
   c->count = 2;
   c->round[0] = BEST;
@@ -68,6 +92,7 @@ static orb_status walk_all(orb_context *ctx, contest *c) {
   if (c->known <= ORB_FIND_CONTEST_POOR) {
     return ORB_OK;
   }
+  drop_worse(ctx, c);
   c->count = 0;
   if (c->match->other_count > 1) {
     c->round[c->count++] = THIRD;
@@ -92,11 +117,17 @@ static orb_status finish_best(orb_context *ctx, contest *c) {
   }
   for (int32_t n = 0; n < MOST; n++) {
     if (n != c->round[0] && (c->count < 2 || n != c->round[1])) {
-      orb_map_draft_free(ctx, c->draft[n]);
-      c->draft[n] = NULL;
+      drop(ctx, c, n);
     }
   }
   return orb_tasks_run(ctx, c->count, finish, c);
+}
+
+/* How clearly a winner beats the best match: by finished maps if both are finished, otherwise by walks. */
+static double clear_of(const contest *c, int32_t winner) {
+  const double *energy = c->draft[BEST] ? c->energy : c->walked;
+  const double least = fmin(energy[BEST], orb_map_params_of(c->preset).energy.poor);
+  return winner == BEST ? 0 : fmax(0, 1 - energy[winner] / least);
 }
 
 /* Takes the better map. Of two that are as good, that of the match that bends the shapes less wins. */
@@ -106,10 +137,9 @@ static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *
   if (score(c, c->round[second]) < ORB_FIND_CONTEST_GAIN * score(c, winner)) {
     winner = c->round[second];
   }
-  const double least = fmin(c->walked, orb_map_params_of(c->preset).energy.poor);
-  *out = (orb_contest_result){.is_space = winner == SPACE,
-                              .other = winner == SPACE ? 0 : winner,
-                              .clear = fmax(0, 1 - c->energy[winner] / least)};
+  out->is_space = winner == SPACE;
+  out->other = winner == SPACE ? 0 : winner;
+  out->clear = clear_of(c, winner);
   return orb_map_draft_take(ctx, c->draft[winner], &c->alignment->energy);
 }
 
@@ -119,10 +149,12 @@ orb_status orb_contest_run(orb_context *ctx, const orb_match *match, orb_preset 
   orb_status status;
   *out = (orb_contest_result){0};
   for (int32_t n = 0; n < MOST; n++) {
-    c.energy[n] = INFINITY;
+    c.energy[n] = c.walked[n] = INFINITY;
   }
   ORB_GO(status, walk_all(ctx, &c), end);
-  c.walked = c.energy[BEST];
+  for (int32_t n = 0; n < MOST; n++) {
+    c.walked[n] = c.draft[n] ? c.energy[n] : c.walked[n];
+  }
   ORB_GO(status, finish_best(ctx, &c), end);
   status = take_winner(ctx, &c, out);
 end:

@@ -11,7 +11,7 @@
 #include "orbmorph/alignment.h"
 #include "orbmorph/remesh.h"
 
-/* What has won. All 0: the best match. */
+/* What has won. All 0: the best match. clear counts for another match. */
 typedef struct orb_contest_result {
   int is_space;  /* what fits best in space */
   int32_t other; /* 1 + the number of another match */
@@ -22,7 +22,7 @@ typedef struct orb_contest_result {
 int orb_contest_is_open(const orb_match *match, int keep_angles);
 
 /* Composes an alignment of two rotated spheres that keep angles towards what wins, and fills alignment->energy.
- * match->moves says which shape moves. */
+ * match->moves says which shape moves; a first shape that is large stays, since it is no copy (align.c). */
 ORB_MUST_CHECK orb_status orb_contest_run(orb_context *ctx, const orb_match *match, orb_preset preset,
                                           orb_alignment *alignment, orb_contest_result *out);
 

@@ -217,14 +217,14 @@ orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mes
 }
 
 orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving, double **target) {
+  ORB_ASSERT(match->is_found && n >= 0 && n <= match->other_count);
   orb_trials *t = match->trials;
   orb_trial *one = &t->trial[t->list[n]];
-  ORB_ASSERT(match->is_found && n <= match->other_count);
   *target = NULL;
   if (!(one->cost < INFINITY)) { /* it was dropped before its way back was registered */
     ORB_TRY(orb_trials_complete(ctx, t, t->list[n]));
   }
-  return write_targets(ctx, t, one, moving, target);
+  return one->cost < INFINITY ? write_targets(ctx, t, one, moving, target) : ORB_OK;
 }
 
 orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear) {

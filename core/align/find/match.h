@@ -7,6 +7,7 @@
  *   trials.h  rough maps, registered and ranked
  *   match.h   the best of them, its pairs and its targets
  *   found.h   the landmarks that an alignment found, and their confidence
+ *   contest.h which of the best matches leads to the better map
  *   params.h  all thresholds
  *
  * Decimated copies of both shapes are registered to each other along each rough map, in both directions
@@ -51,9 +52,9 @@ typedef struct orb_match {
   double clear;  /* 0 to 1: how far the next best map that differs is behind */
   double lead;   /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
                     half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
-  int moves; /* which shape moves in walks: the second (1), unless the first (0) is clearly less round. Limbs that move
-                stretch to where they go; limbs that stay are left out by the triangles of a round shape, and its energy
-                does not show it */
+  int moves; /* which shape moves in a contest: the second (1), unless the first (0) is clearly less round. Limbs that
+                move stretch to where they go; limbs that stay are left out by the triangles of a round shape, and its
+                energy does not show it */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
@@ -68,8 +69,10 @@ typedef struct orb_match {
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
- * other[n − 1]. moving: 0, the first shape, or 1, the second. The caller frees *target, also on failure. The meshes of
- * the match must still exist. Several targets may be computed side by side. About 0.1 s of one thread. */
+ * other[n − 1]. moving: 0, the first shape, or 1, the second, which alone is drawn to landmarks. *target: the caller's
+ * to free, also on failure; NULL if a degenerate shape cannot be registered back, which the best map excludes. The
+ * meshes of the match must still exist. Targets of different n may be computed side by side: each completes its own
+ * trial. About 0.1 s of one thread. */
 ORB_MUST_CHECK orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving,
                                            double **target);
 /* Makes other[k] the best map; the former best map becomes the first of the others. target: NULL, or that of other[k];

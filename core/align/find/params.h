@@ -1,5 +1,5 @@
-/* The thresholds, weights and counts of the search for correspondences, for this folder and auto.c. A constant that
- * only one function needs stays beside it: two in align/auto.c, two in suspects.c.
+/* The thresholds, weights and counts of the search for correspondences, for this folder, given/ and auto.c. A constant
+ * that only one function needs stays beside it: two in align/auto.c, two in suspects.c.
  *
  * Units. "Of the diagonal": a distance in space, relative to the diagonal of the shape's bounding box. Costs and
  * ratios have no unit.
@@ -70,8 +70,8 @@ static const double ORB_FIND_CONTEST_POOR = 2.5;
  * pinned as well: three such pairs came to 1.9, 2.2 and 4.4 in 10 s. */
 static const double ORB_FIND_PINS_ABOVE = 2.5;
 /* If the map of two shapes has more energy than this after all matches, a start from what fits best in space competes.
- * Of 210 pairs of other kinds, 52 had more; of eight of these, six came down by up to a half (human_man to
- * shrec397, 5.6 to 2.7). It takes as long as a match. */
+ * Of eight pairs of other kinds, six came down by up to a half (human_man to shrec397, 5.6 to 2.7).
+ * Where a contest is held, the same start takes part in it. It takes as long as a match. */
 static const double ORB_FIND_SPACE_ABOVE = 2.5;
 /* Up to this energy of rotated spheres the shapes are alike, such as balls with small features, and keep their given
  * spheres. The rotated spheres of people in poses have 4 and more. */

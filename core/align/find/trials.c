@@ -53,7 +53,7 @@ static orb_status make_fine(orb_context *ctx, void *arg, int32_t s) {
 }
 
 orb_status orb_trials_refine(orb_trials *t) {
-  return t->fine[0].mesh.vertex_count > 0 ? ORB_OK : orb_tasks_run(t->ctx, 2, make_fine, t);
+  return orb_tasks_run(t->ctx, 2, make_fine, t);
 }
 
 void orb_trial_pose_free(orb_context *ctx, orb_elastic_pose *pose) {

@@ -34,7 +34,8 @@ typedef struct orb_trials {
   const orb_mesh *mesh[2]; /* borrowed */
   orb_trial_scaling scaling[2];
   orb_coarse_copy copy[2]; /* scaled */
-  orb_coarse_copy fine[2]; /* the same with ORB_FIND_FINE vertices, on which matches are settled; empty until needed */
+  orb_coarse_copy fine[2]; /* the same with ORB_FIND_FINE vertices, on which matches are settled; empty before
+                              orb_trials_refine() */
   orb_hint_places hint;    /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
   orb_spectral_dense dense;
   int32_t *rotated[2]; /* the maps of the rotations, one after the other, laid out as in `dense` */
@@ -52,7 +53,7 @@ ORB_MUST_CHECK orb_status orb_trials_open(orb_context *ctx, const orb_mesh *firs
                                           orb_trials *trials);
 void orb_trials_close(orb_trials *trials);
 
-/* Makes the fine copies, unless they are there. */
+/* Makes the fine copies, once a match is found. */
 ORB_MUST_CHECK orb_status orb_trials_refine(orb_trials *trials);
 
 /* Makes the trials: spectral maps and rotations of the spheres. */

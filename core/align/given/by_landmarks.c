@@ -66,7 +66,7 @@ static void posed_free(orb_context *ctx, posed *p) {
 }
 
 /* What the two ways share. */
-typedef struct contest {
+typedef struct two_ways {
   orb_context *ctx;
   const orb_align_shape *shapes;
   int32_t shape_count;
@@ -77,11 +77,11 @@ typedef struct contest {
   orb_alignment pinned; /* once has_tried_pins; empty if the pins have no room */
   int has_tried_pins, lacks_room;
   int walked; /* the pins of two shapes meet in a map that a landmark walk has led to */
-} contest;
+} two_ways;
 
 /* Pins the landmarks, and improves the alignment of two shapes by a landmark walk. Its energy is INFINITY without one.
  */
-static orb_status try_pins(contest *c) {
+static orb_status try_pins(two_ways *c) {
   orb_alignment *a = &c->pinned;
   if (c->has_tried_pins) {
     return ORB_OK;
@@ -106,7 +106,7 @@ static orb_status try_pins(contest *c) {
 
 /* Is a pose whose first map has this energy worth more work? Not if the pins have a clearly better one. */
 static orb_status ask_pins(void *user, double energy, int *goes_on) {
-  contest *c = user;
+  two_ways *c = user;
   ORB_TRY(try_pins(c));
   const double poor = orb_map_params_of(c->options->preset).energy.poor;
   *goes_on = !c->walked || c->pinned.energy > poor || c->pinned.energy > ORB_FIND_POSED_BEATEN * energy;
@@ -116,7 +116,7 @@ static orb_status ask_pins(void *user, double energy, int *goes_on) {
 /* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
  * partners, with all of them pinned. Soft landmarks exclude matches only if too few are exact. sure: that of the hint.
  * Raises the pose's worst energy, to INFINITY if there is no such match, or no such map. */
-static orb_status compose_posed(contest *c, int32_t s, double sure, int keeps_angles) {
+static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_angles) {
   orb_context *ctx = c->ctx;
   posed *p = &c->posed;
   orb_alignment *a = &p->alignment;
@@ -164,7 +164,7 @@ done:
   return status;
 }
 
-static orb_status compose_all_posed(contest *c, double sure) {
+static orb_status compose_all_posed(two_ways *c, double sure) {
   orb_context *ctx = c->ctx;
   posed *p = &c->posed;
   orb_align_options rotated = *c->options;
@@ -197,7 +197,7 @@ end:
  * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
  * the surface between them. sure: that of orb_match_hint. Nothing is found if the landmarks do not show one body, if
  * there is no map, or if such a sphere has no room for a landmark; pins can meet if the given sphere has room. */
-static orb_status try_pose(contest *c, double sure) {
+static orb_status try_pose(two_ways *c, double sure) {
   posed *p = &c->posed;
   memset(p, 0, sizeof *p);
   orb_status status = compose_all_posed(c, sure);
@@ -209,7 +209,7 @@ static orb_status try_pose(contest *c, double sure) {
 }
 
 /* Leaves the better of the two in c->pinned. */
-static void keep_better(contest *c) {
+static void keep_better(two_ways *c) {
   if (c->posed.is_found) {
     orb_alignment_keep_better(c->ctx, &c->pinned, &c->posed.alignment);
     c->posed.is_found = 0;
@@ -219,7 +219,7 @@ static void keep_better(contest *c) {
 /* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a
  * match may lead to a better one, even if the landmarks show one body less clearly. All other starts are for shapes for
  * which neither works. */
-static orb_status improve(contest *c) {
+static orb_status improve(two_ways *c) {
   const orb_preset preset = c->options->preset;
   const orb_map_params params = orb_map_params_of(preset);
   const double good = params.energy.good, poor = params.energy.poor;
@@ -242,12 +242,12 @@ static orb_status improve(contest *c) {
 }
 
 /* Whether a match makes pins needless. With more than two shapes, no walk competes with it. */
-static int is_enough(const contest *c) {
+static int is_enough(const two_ways *c) {
   const double most = c->shape_count > 2 ? ORB_FIND_POSED_POOR : orb_map_params_of(c->options->preset).energy.good;
   return c->posed.is_found && c->options->preset != ORB_PRESET_QUALITY && c->posed.worst <= most;
 }
 
-static orb_status hold(contest *c) {
+static orb_status hold(two_ways *c) {
   if (c->landmark_count >= ORB_FIND_HINT_LEAST) {
     ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH));
   }
@@ -265,12 +265,12 @@ static orb_status hold(contest *c) {
 orb_status orb_align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                   const orb_landmark *landmarks, int32_t landmark_count,
                                   const orb_align_options *options, orb_alignment *out) {
-  contest c = {.ctx = ctx,
-               .shapes = shapes,
-               .shape_count = shape_count,
-               .landmarks = landmarks,
-               .landmark_count = landmark_count,
-               .options = options};
+  two_ways c = {.ctx = ctx,
+                .shapes = shapes,
+                .shape_count = shape_count,
+                .landmarks = landmarks,
+                .landmark_count = landmark_count,
+                .options = options};
   orb_status status = hold(&c);
   orb_alignment *winner = c.posed.is_found ? &c.posed.alignment : &c.pinned;
   memset(out, 0, sizeof *out);

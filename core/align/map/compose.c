@@ -414,8 +414,7 @@ struct orb_map_draft {
   orb_map_run run;
   orb_map_walked walked;
   orb_aligned_shape *fixed;
-  double *target; /* what fits best in space, if no target was given */
-  orb_preset preset;
+  double *target;   /* what fits best in space, if no target was given */
   double energy[2]; /* as of orb_compose() */
 };
 
@@ -427,7 +426,6 @@ static orb_status aim_in_space(orb_map_draft *d) {
   if (!d->target) {
     return ORB_E_NO_MEMORY;
   }
-  ORB_TRY(orb_map_spectral_samples(c));
   ORB_TRY(orb_map_register(c, 0));
   for (size_t i = 0; i < count; i++) {
     d->target[i] = c->target[i] / c->b.scale + c->b.centre[i % 3];
@@ -446,13 +444,12 @@ orb_status orb_map_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_
   }
   d->run = run_of(ctx, fixed, moving, 1, 0, &guide, preset);
   d->fixed = fixed;
-  d->preset = preset;
   ORB_TRY(open_run(&d->run, &guide, d->energy));
   if (!target) {
     ORB_TRY(aim_in_space(d));
   }
   d->run.beat.energy = known < INFINITY ? known : 0; /* fewer walks are then tried */
-  ORB_TRY(orb_map_draft_walks(&d->run, &d->walked));
+  ORB_TRY(orb_map_target_walks(&d->run, &d->walked));
   d->run.beat.energy = 0;
   *energy = d->walked.energy;
   return ORB_OK;
@@ -461,7 +458,7 @@ orb_status orb_map_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_
 orb_status orb_map_draft_finish(orb_context *ctx, orb_map_draft *d, double *energy) {
   d->run.ctx = ctx;
   d->run.drafted = &d->walked;
-  ORB_TRY(run(&d->run, ORB_MAP_FROM_SPACE, d->preset));
+  ORB_TRY(orb_map_follow_targets(&d->run));
   *energy = fmin(d->run.best_energy, d->energy[0]);
   return ORB_OK;
 }

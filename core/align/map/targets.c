@@ -9,7 +9,8 @@
  *
  * If none of these gives such a map, samples of the targets guide landmark walks (walked.h). A walk begins without
  * flips and is optimised on a coarse level, so several are tried, and the best one is refined. If the caller says so, a
- * walk comes first, and replaces all starts: of 30 pairs of other kinds, it led to the map that was kept in 22. */
+ * walk comes first, and replaces all starts: of 30 pairs of other kinds, it led to the map that was kept in 22. Or it
+ * comes after the first start, if that leads to a poor map, and before further ones. */
 #include "align/map/targets.h"
 
 #include <math.h>
@@ -84,14 +85,14 @@ static orb_status start_coarser(orb_map_run *c) {
   return status;
 }
 
-orb_status orb_map_draft_walks(orb_map_run *c, orb_map_walked *out) {
+orb_status orb_map_target_walks(orb_map_run *c, orb_map_walked *out) {
   *out = (orb_map_walked){.energy = INFINITY};
   ORB_TRY(register_first(c));
   return orb_map_walked_improve(c, out);
 }
 
-/* From walks that the targets guide: the best of them is refined if it comes below the best map so far, and below what
- * the caller knows. */
+/* From walks that the targets guide: the best of them is refined if it comes near the best map so far or below, and
+ * below what the caller knows. Refined, it often has less energy. */
 static orb_status start_guided(orb_map_run *c) {
   orb_map_walked best = {.energy = INFINITY};
   orb_status status = ORB_OK;
@@ -218,7 +219,7 @@ orb_status orb_map_follow_targets(orb_map_run *c) {
   if (c->course.is_beaten) {
     return ORB_OK;
   }
-  if (!walked && c->walks_early && c->best_energy > c->params.targets.walked) {
+  if (!walked && c->walks_early && !c->walks_first && c->best_energy > c->params.targets.walked) {
     ORB_TRY(walk_towards(c, &walked));
     if (!walked && c->starts_smooth) {
       ORB_TRY(smooth_targets(c));

@@ -1,4 +1,4 @@
-/* What one call of orb_compose() holds while it runs; compose.c, starts/ and twist/ share it. */
+/* What one call of orb_compose(), or a draft, holds while it runs; compose.c, starts/ and twist/ share it. */
 #ifndef ORB_ALIGN_MAP_ENGINE_RUN_H
 #define ORB_ALIGN_MAP_ENGINE_RUN_H
 
@@ -53,7 +53,7 @@ typedef struct orb_map_run {
   orb_map_beat beat;              /* see orb_map_guide */
   orb_map_rival rival;            /* see orb_map_guide */
   int walks_first, walks_early;   /* see orb_map_guide */
-  struct orb_map_walked *drafted; /* NULL, or the walks towards the targets, which were made beforehand (targets.h) */
+  struct orb_map_walked *drafted; /* NULL, or the best walk towards the targets, made beforehand (targets.h) */
   orb_map_course course;          /* see orb_map_guide; its bulks are measured only if asked for */
   int wants_course;               /* whether they are asked for */
   const double *given_target;     /* for registrations without samples, in the fixed shape's space; NULL: computed */

@@ -210,8 +210,10 @@ done:
 }
 
 static void free_sheets(orb_map_run *c, orb_sheet sheets[2]) {
-  orb_free(c->ctx, sheets[0].shape.points);
-  orb_free(c->ctx, sheets[1].shape.points);
+  for (int s = 0; s < 2; s++) {
+    orb_free(c->ctx, sheets[s].shape.points);
+    sheets[s].shape.points = NULL;
+  }
 }
 
 static orb_status walk_pairs(orb_map_run *c, int32_t count, int *stuck) {
