@@ -1,11 +1,11 @@
 /* Alignment without landmarks.
  *
  * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
- * (find/match.c), and the composed map goes to the targets of its match. If that gives no good map of two shapes, the
- * next best match is tried, and then what fits best in space. Two shapes that bend much hold a contest of their matches
- * instead (find/contest.h). If it gives none of more shapes, pairs of the matches are
- * pinned as landmarks, and the map is composed with the pairs held and then without them. The alignment of least energy
- * is returned. The preset `fast` only searches for rotations of the given spheres.
+ * (find/match.c), and the composed map goes to the targets of its match. Two shapes that bend much hold a contest of
+ * their matches instead (find/contest.h). If the targets give no good map of two shapes, the next best match is tried,
+ * and then what fits best in space. If they give none of more shapes, pairs of the matches are pinned as landmarks, and
+ * the map is composed with the pairs held and then without them. The alignment of least energy is returned. The preset
+ * `fast` only searches for rotations of the given spheres.
  */
 #include <math.h>
 #include <string.h>
@@ -236,6 +236,12 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
   return ORB_OK;
 }
 
+/* No match has led to the map. */
+static void count_as_unclear(matches *m) {
+  m->clear = 0;
+  m->lead = 1;
+}
+
 /* If matches have led to no map of two shapes that correspond, what fits best in space may lead to a better one: limbs
  * that bend the shape much then go where there is room for them. The match then counts as unclear. */
 static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shapes, matches *m,
@@ -247,8 +253,7 @@ static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shap
   ORB_TRY(rotate_spheres(ctx, shapes, m->shape_count, options, &other));
   orb_status status = orb_compose_all(ctx, &other, ORB_MAP_FROM_SPACE, NULL, options->preset);
   if (status == ORB_OK && other.energy < alignment->energy) {
-    m->clear = 0;
-    m->lead = 1;
+    count_as_unclear(m);
   }
   if (status == ORB_OK) {
     orb_alignment_keep_better(ctx, alignment, &other);
@@ -264,8 +269,7 @@ static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_opt
   orb_contest_result won;
   ORB_TRY(orb_contest_run(ctx, &m->of[1], options->preset, alignment, &won));
   if (won.is_space) {
-    m->clear = 0;
-    m->lead = 1;
+    count_as_unclear(m);
   }
   return won.other > 0 ? choose_other(ctx, m, won.other - 1, NULL, won.clear) : ORB_OK;
 }

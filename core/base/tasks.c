@@ -52,7 +52,7 @@ static orb_status first_error(const tasks *t, int32_t count) {
 
 orb_status orb_tasks_run(orb_context *ctx, int32_t count, orb_task_fn run, void *arg) {
   const int threads = ctx->options.threads;
-  if (threads == 1 || count == 1) {
+  if (threads == 1 || count <= 1) {
     for (int32_t i = 0; i < count; i++) {
       ORB_TRY(run(ctx, arg, i));
     }

@@ -9,7 +9,7 @@
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"
-#include "base/parallel.h"
+#include "base/tasks.h"
 #include "spectral/cost.h"
 
 enum { ORDERS = 14, SIGNS = 1 << (ORB_ZOOM_START - 1), STARTS = ORDERS * SIGNS };
@@ -191,15 +191,11 @@ typedef struct shape_job {
   search *s;
   const orb_mesh *mesh[2];
   int mirrored;
-  orb_status status[2];
 } shape_job;
 
-static void create_shapes(void *arg, int64_t begin, int64_t end, int thread) {
-  shape_job *job = arg;
-  (void)thread;
-  for (int64_t i = begin; i < end; i++) {
-    job->status[i] = orb_spectral_shape_create(job->s->ctx, job->mesh[i], i == 1 && job->mirrored, &job->s->shape[i]);
-  }
+static orb_status create_shape(orb_context *ctx, void *arg, int32_t i) {
+  const shape_job *job = arg;
+  return orb_spectral_shape_create(ctx, job->mesh[i], i == 1 && job->mirrored, &job->s->shape[i]);
 }
 
 static orb_status find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored, int32_t most,
@@ -211,10 +207,8 @@ static orb_status find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, i
     return ORB_E_NO_MEMORY;
   }
   s->ctx = ctx;
-  shape_job job = {s, {a, b}, mirrored, {ORB_OK, ORB_OK}};
-  orb_parallel_for(ctx, 2, 1, create_shapes, &job);
-  ORB_GO(status, job.status[0], end);
-  ORB_GO(status, job.status[1], end);
+  shape_job job = {s, {a, b}, mirrored};
+  ORB_GO(status, orb_tasks_run(ctx, 2, create_shape, &job), end);
   if (s->shape[0].is_usable && s->shape[1].is_usable) {
     ORB_GO(status, run(s, out), end);
     if (dense) {

@@ -152,6 +152,35 @@ orb_mesh shape_ball(orb_context *ctx, int levels) {
   return mesh;
 }
 
+orb_mesh shape_creature(orb_context *ctx, int count, const double (*limb)[3], const double *reach, int levels) {
+  orb_mesh mesh = shape_ball(ctx, levels);
+  for (int32_t v = 0; v < mesh.vertex_count; v++) {
+    double *p = mesh.positions + 3 * (size_t)v, r = 1;
+    for (int i = 0; i < count; i++) {
+      double c = p[0] * limb[i][0] + p[1] * limb[i][1] + p[2] * limb[i][2];
+      r += (reach[i] - 1) * exp(-20 * (1 - c));
+    }
+    for (int k = 0; k < 3; k++) {
+      p[k] *= r;
+    }
+  }
+  return mesh;
+}
+
+int32_t shape_farthest(const orb_mesh *mesh, const double direction[3]) {
+  int32_t best = 0;
+  double most = -INFINITY;
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    double along = 0;
+    for (int k = 0; k < 3; k++) {
+      along += direction[k] * mesh->positions[3 * (size_t)v + (size_t)k];
+    }
+    best = along > most ? v : best;
+    most = fmax(most, along);
+  }
+  return best;
+}
+
 int64_t shape_repaired(const orb_mesh *mesh, const char *kind) {
   for (int i = 0; i < mesh->repair_count; i++) {
     if (strcmp(mesh->repairs[i].kind, kind) == 0) {

@@ -21,36 +21,6 @@ enum { LIMBS = 4 };
 
 static const double limb[LIMBS][3] = {{1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6}, {-0.48, -0.6, -0.64}};
 
-/* A ball with limbs. */
-static orb_mesh creature_of(orb_context *ctx, const double reach[LIMBS], int levels) {
-  orb_mesh mesh = shape_ball(ctx, levels);
-  for (int32_t v = 0; v < mesh.vertex_count; v++) {
-    double *p = mesh.positions + 3 * (size_t)v, r = 1;
-    for (int i = 0; i < LIMBS; i++) {
-      double c = p[0] * limb[i][0] + p[1] * limb[i][1] + p[2] * limb[i][2];
-      r += (reach[i] - 1) * exp(-20 * (1 - c));
-    }
-    for (int k = 0; k < 3; k++) {
-      p[k] *= r;
-    }
-  }
-  return mesh;
-}
-
-static int32_t tip_of(const orb_mesh *mesh, int i) {
-  int32_t best = 0;
-  double most = -INFINITY;
-  for (int32_t v = 0; v < mesh->vertex_count; v++) {
-    double along = 0;
-    for (int k = 0; k < 3; k++) {
-      along += limb[i][k] * mesh->positions[3 * (size_t)v + (size_t)k];
-    }
-    best = along > most ? v : best;
-    most = fmax(most, along);
-  }
-  return best;
-}
-
 typedef struct outcome {
   orb_alignment alignment;
   orb_contest_result won;
@@ -76,11 +46,11 @@ static void hold(orb_context *ctx, const orb_align_shape shapes[2], outcome *out
 /* Each tip of the first shape is nearest on the sphere to that of the same limb. */
 static void assert_tips(const orb_mesh mesh[2], const orb_alignment *alignment) {
   for (int i = 0; i < LIMBS; i++) {
-    const double *p = alignment->shapes[0].points + 3 * (size_t)tip_of(&mesh[0], i);
+    const double *p = alignment->shapes[0].points + 3 * (size_t)shape_farthest(&mesh[0], limb[i]);
     int best = 0;
     double most = -2;
     for (int k = 0; k < LIMBS; k++) {
-      const double *q = alignment->shapes[1].points + 3 * (size_t)tip_of(&mesh[1], k);
+      const double *q = alignment->shapes[1].points + 3 * (size_t)shape_farthest(&mesh[1], limb[k]);
       const double near = p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
       best = near > most ? k : best;
       most = fmax(most, near);
@@ -107,7 +77,7 @@ static void assert_contest(int lean) {
     assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
     orb_embed_defaults(&embed);
     for (int s = 0; s < 2; s++) {
-      mesh[s] = creature_of(ctx, reach[s == lean ? 0 : 1], 4);
+      mesh[s] = shape_creature(ctx, LIMBS, limb, reach[s == lean ? 0 : 1], 4);
       assert_int_equal(orb_embed(ctx, &mesh[s], &embed, &embedding[s]), ORB_OK);
       shapes[s] = (orb_align_shape){&mesh[s], embedding[s].points};
     }

@@ -21,16 +21,12 @@ static const double reach[LIMBS] = {4, 3.4, 2.9, 2.5, 2.2};
 
 /* A ball with limbs, rotated around (1, 1, 1) by this many thirds of a full turn. */
 static orb_mesh creature_of(orb_context *ctx, const double far[LIMBS], int levels, int thirds) {
-  orb_mesh mesh = shape_ball(ctx, levels);
+  orb_mesh mesh = shape_creature(ctx, LIMBS, limb, far, levels);
   for (int32_t v = 0; v < mesh.vertex_count; v++) {
-    double *p = mesh.positions + 3 * (size_t)v, r = 1, q[3];
-    for (int i = 0; i < LIMBS; i++) {
-      double c = p[0] * limb[i][0] + p[1] * limb[i][1] + p[2] * limb[i][2];
-      r += (far[i] - 1) * exp(-20 * (1 - c));
-    }
-    memcpy(q, p, sizeof q);
+    double *p = mesh.positions + 3 * (size_t)v;
+    const double q[3] = {p[0], p[1], p[2]};
     for (int k = 0; k < 3; k++) {
-      p[(k + thirds) % 3] = r * q[k];
+      p[(k + thirds) % 3] = q[k];
     }
   }
   return mesh;
@@ -38,17 +34,11 @@ static orb_mesh creature_of(orb_context *ctx, const double far[LIMBS], int level
 
 /* The vertex at the end of a limb of a creature that is rotated by this many thirds. */
 static int32_t tip_of(const orb_mesh *mesh, int i, int thirds) {
-  int32_t best = 0;
-  double most = -INFINITY;
-  for (int32_t v = 0; v < mesh->vertex_count; v++) {
-    double along = 0;
-    for (int k = 0; k < 3; k++) {
-      along += limb[i][k] * mesh->positions[3 * (size_t)v + (size_t)((k + thirds) % 3)];
-    }
-    best = along > most ? v : best;
-    most = fmax(most, along);
+  double direction[3];
+  for (int k = 0; k < 3; k++) {
+    direction[(k + thirds) % 3] = limb[i][k];
   }
-  return best;
+  return shape_farthest(mesh, direction);
 }
 
 /* Each limb of the shape that moves goes to its counterpart. thirds: of the second shape. */

@@ -24,18 +24,7 @@ static const double twin_limb[LIMBS][3] = {
 static const double twin_reach[LIMBS] = {3.5, 3.5, 2.5, 2.5, 2};
 
 static orb_mesh creature_of(const double (*direction)[3], const double *far, int levels) {
-  orb_mesh mesh = shape_ball(ctx, levels);
-  for (int32_t v = 0; v < mesh.vertex_count; v++) {
-    double *p = mesh.positions + 3 * (size_t)v, r = 1;
-    for (int i = 0; i < LIMBS; i++) {
-      double c = p[0] * direction[i][0] + p[1] * direction[i][1] + p[2] * direction[i][2];
-      r += (far[i] - 1) * exp(-20 * (1 - c));
-    }
-    for (int k = 0; k < 3; k++) {
-      p[k] *= r;
-    }
-  }
-  return mesh;
+  return shape_creature(ctx, LIMBS, direction, far, levels);
 }
 
 /* x, y, z → y, z, x: a rotation; and other vertex numbers. */

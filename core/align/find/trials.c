@@ -9,7 +9,6 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "base/tasks.h"
 #include "elastic/elastic.h"
 #include "numeric/rotation.h"
@@ -142,32 +141,36 @@ orb_status orb_trials_make(orb_trials *t) {
   return add_rotations(t);
 }
 
-static void register_tasks(void *arg, int64_t begin, int64_t end, int thread) {
-  orb_trials *t = arg;
-  (void)thread;
-  for (int64_t i = begin; i < end; i++) {
-    orb_trial *one = &t->trial[t->task[i] / 2];
-    int s = t->task[i] % 2;
-    t->status[i] = orb_elastic_register(t->ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &one->map[s], NULL,
-                                        &one->pose[s], &one->bend[s]);
-  }
+/* Registers a trial in one direction. */
+static orb_status register_trial(orb_context *ctx, orb_trials *t, int32_t number, int s) {
+  orb_trial *one = &t->trial[number];
+  return orb_elastic_register(ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &one->map[s], NULL, &one->pose[s],
+                              &one->bend[s]);
+}
+
+/* Trials that are registered at once. */
+typedef struct registered {
+  orb_trials *t;
+  int direction;
+  int32_t trial[ORB_TRIALS_MAX];
+} registered;
+
+static orb_status register_one(orb_context *ctx, void *arg, int32_t i) {
+  const registered *all = arg;
+  return register_trial(ctx, all->t, all->trial[i], all->direction);
 }
 
 /* Registers the trials that are not dropped in one direction, side by side. */
 static orb_status register_all(orb_trials *t, int direction) {
+  registered all = {.t = t, .direction = direction};
   int32_t count = 0;
   for (int32_t i = 0; i < t->count; i++) {
     if (t->trial[i].cost < INFINITY) {
-      t->task[count++] = 2 * i + direction;
+      all.trial[count++] = i;
     }
   }
   ORB_TRY(orb_context_check(t->ctx));
-  orb_parallel_for(t->ctx, count, 1, register_tasks, t);
-  for (int32_t i = 0; i < count; i++) {
-    if (t->status[i] != ORB_OK) {
-      return t->status[i];
-    }
-  }
+  ORB_TRY(orb_tasks_run(t->ctx, count, register_one, &all));
   return orb_context_check(t->ctx);
 }
 
@@ -330,10 +333,8 @@ void orb_trials_list(orb_trials *t) {
 }
 
 orb_status orb_trials_complete(orb_context *ctx, orb_trials *t, int32_t number) {
-  orb_trial *one = &t->trial[number];
-  ORB_TRY(
-      orb_elastic_register(ctx, &t->copy[1].mesh, &t->copy[0].mesh, &one->map[1], NULL, &one->pose[1], &one->bend[1]));
-  fill_cost(t, one, 2);
+  ORB_TRY(register_trial(ctx, t, number, 1));
+  fill_cost(t, &t->trial[number], 2);
   return ORB_OK;
 }
 

@@ -43,9 +43,6 @@ typedef struct orb_trials {
   int32_t count;
   int32_t list[ORB_TRIALS_LISTED]; /* see orb_trials_list() */
   int32_t listed;
-  /* of the loop that registers */
-  int32_t task[2 * ORB_TRIALS_MAX]; /* 2 · trial + direction */
-  orb_status status[2 * ORB_TRIALS_MAX];
 } orb_trials;
 
 /* Scales the shapes and makes their copies. Zero the struct before; free it in any case. */
