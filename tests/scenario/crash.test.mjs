@@ -37,9 +37,11 @@ function pointsOf(folder) {
       : [];
   });
 }
-// This load reaches none of these: webhooks, S3, copies between stores, a check in a separate process.
-const elsewhere = ['check-begun', 'publish-uploaded', 'transfer', 'webhook-answered'];
-const points = [...new Set(pointsOf(path.join(root, 'server')))].filter((name) => !elsewhere.includes(name)).sort();
+// This load reaches none of these: webhooks, S3, copies between stores, and checks and conversions in a separate process.
+const elsewhere = ['check-begun', 'convert-begun', 'publish-uploaded', 'transfer', 'webhook-answered'];
+const points = [...new Set(pointsOf(path.join(root, 'server')))]
+  .filter((name) => !elsewhere.includes(name) && !name.startsWith('move-'))
+  .sort();
 
 let made = 0;
 function newMesh() {
