@@ -127,6 +127,9 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
     if (static_cast<size_t>(whole(accessor, "count", 0)) != points || width < 1 || width > 4) {
       malformed("A compressed glTF primitive does not fit its accessors.");
     }
+    if (attribute->data_type() == draco::DT_BOOL) { /* glTF has no such numbers, and Draco reads any byte as one */
+      malformed("A compressed glTF primitive has an attribute of truth values, which glTF lacks.");
+    }
     charge(points * width * sizeof(double));
     Values values{Numbers(points * width, 0, Charged<double>(ctx_)), width};
     /* Draco itself converts integers to fractions where its attribute is marked as normalized. */

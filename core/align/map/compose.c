@@ -22,7 +22,8 @@
  * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
  *
  * If spatial targets are given, other starts are used, and limbs are untwisted only at the end (targets.h). Then the
- * map slides to where the shapes fit each other in space (slide.h).
+ * map slides to where the shapes fit each other in space (space/slide.h), or it is drawn to where a part does
+ * (space/part.h).
  *
  * Each start (start.h) is then refined up to all vertices, and no flip is allowed again. The map of least energy wins
  * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c), once before
@@ -43,7 +44,8 @@
 #include "align/map/engine/step.h"
 #include "align/map/levels.h"
 #include "align/map/lifted.h"
-#include "align/map/slide.h"
+#include "align/map/space/part.h"
+#include "align/map/space/slide.h"
 #include "align/map/start.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
@@ -282,14 +284,14 @@ static int should_slide(const orb_map_run *c, orb_map_from from) {
          (c->best_energy <= c->params.energy.good || (c->given_target && c->keeps_angles));
 }
 
-/* Writes the best map back if it is better than the alignment as given and certified. */
+/* Writes the best map back if it is better than the alignment as given, or fits parts, and is certified. */
 static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double energy[2], int *improved) {
   orb_aligned_shape *shapes[2] = {c->moving, fixed};
   orb_map_candidate best = {c->best, c->fixed_points, c->best_energy};
   orb_certificate certificate[2] = {{.valid = 1}, {.valid = 1}};
-  best = c->kept.points && c->kept.energy <= best.energy ? c->kept : best;
+  best = !c->fits_part && c->kept.points && c->kept.energy <= best.energy ? c->kept : best;
   const double *points[2] = {best.points, best.fixed};
-  if (!(best.energy < energy[0])) {
+  if (!c->fits_part && !(best.energy < energy[0])) {
     return ORB_OK;
   }
   for (int s = 0; s < 2; s++) {
@@ -365,13 +367,19 @@ static orb_status open_run(orb_map_run *c, const orb_map_guide *guide, double en
   return ORB_OK;
 }
 
-/* Untwists limbs, and slides where that may help. before: the energy of the map as given. */
-static orb_status untwist_and_slide(orb_map_run *c, orb_map_from from, double before) {
+/* Untwists limbs. Then draws the map to where parts of the shapes fit in space, or slides where that may help. before:
+ * the energy of the map as given. */
+static orb_status untwist_and_fit(orb_map_run *c, orb_map_from from, double before) {
   const int is_hopeless = c->course.is_beaten || (c->given_target && c->best_energy > c->params.targets.hopeless);
+  int is_part;
   if (is_hopeless || (from == ORB_MAP_FROM_WALK && !(c->best_energy < before))) {
     return ORB_OK;
   }
   ORB_TRY(orb_map_untwist(c, INFINITY));
+  ORB_TRY(orb_map_is_part(c, &is_part));
+  if (is_part) {
+    return orb_map_fit_part(c);
+  }
   return should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
 }
 
@@ -398,7 +406,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
-    ORB_GO(status, untwist_and_slide(&c, guide->from, energy[0]), done);
+    ORB_GO(status, untwist_and_fit(&c, guide->from, energy[0]), done);
   }
   if (guide->course) {
     ORB_GO(status, orb_map_energy_of(&c, c.best, c.params.energy.bulk, &c.course.bulk), done);
@@ -466,7 +474,7 @@ orb_status orb_map_draft_finish(orb_context *ctx, orb_map_draft *d, double *ener
 orb_status orb_map_draft_take(orb_context *ctx, orb_map_draft *d, double *energy) {
   int improved = 0;
   d->run.ctx = ctx;
-  ORB_TRY(untwist_and_slide(&d->run, ORB_MAP_FROM_SPACE, d->energy[0]));
+  ORB_TRY(untwist_and_fit(&d->run, ORB_MAP_FROM_SPACE, d->energy[0]));
   ORB_TRY(take_best(&d->run, d->fixed, d->energy, &improved));
   *energy = d->energy[1];
   return ORB_OK;

@@ -224,6 +224,15 @@ typedef struct orb_map_params {
                        relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
   } slide;
 
+  /* Drawing a map to where parts of the shapes fit in space. */
+  struct {
+    double
+        scale;  /* three of four distances between landmarks differ by more than this factor: the shapes fit in part */
+    double off; /* most distance of a vertex that fits, after registration */
+    double facing; /* least cosine between its normal and that of the fixed shape there */
+    double most;   /* energy after, relative to before, that is still taken */
+  } part;
+
   /* Drawing a level without flips to its spatial targets. */
   struct {
     int rounds;    /* most */

@@ -2,12 +2,12 @@
  * and hollows tell more. So the moving shape slides in space over the fixed one (elastic/slide.h), from where the map
  * takes it, and the map is drawn to where it comes to lie. Flips are allowed on the way, which also smooths crumples.
  * The errors of 20 pairs of people fall by a third, and the energy rises by about a hundredth. */
-#include "align/map/slide.h"
+#include "align/map/space/slide.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/map/engine/rounds.h"
+#include "align/map/space/drawn.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "elastic/slide.h"
@@ -53,38 +53,6 @@ done:
   return status;
 }
 
-/* The share of the vertices of a level of all vertices that are far from their targets. */
-static double share_left(const orb_map_run *c, const orb_map_level *l, const int32_t *to_mesh) {
-  const double far = c->params.slide.far;
-  int32_t left = 0;
-  for (int32_t v = 0; v < l->count; v++) {
-    left += orb_distance2(l->y + 3 * (size_t)v, c->target + 3 * (size_t)to_mesh[l->vertex[v]]) > far * far;
-  }
-  return (double)left / l->count;
-}
-
-/* Draws a level of all vertices to the targets once. */
-static orb_status draw_once(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
-  const orb_map_params *p = &c->params;
-  const int64_t least = p->targets.work * (int64_t)c->vertex_count;
-  c->work = c->work > least ? c->work : least;
-  orb_map_set_pull(c, l, to_mesh, p->slide.pull);
-  ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(p), p->slide.sweeps));
-  return orb_map_loosen(c, l, p->clear.first_barrier, p->slide.loosen, p->slide.sweeps);
-}
-
-/* Draws a level of all vertices to the targets, again as long as that brings many of those left to theirs: a limb that
- * has slid far is still on its way after a draw. */
-static orb_status draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
-  double before, left = 1;
-  do {
-    before = left;
-    ORB_TRY(draw_once(c, l, to_mesh));
-    left = share_left(c, l, to_mesh);
-  } while (left > c->params.slide.left && left < c->params.slide.arrived * before);
-  return ORB_OK;
-}
-
 orb_status orb_map_slide(orb_map_run *c, double below) {
   orb_context *ctx = c->ctx;
   orb_corner_table s;
@@ -97,15 +65,8 @@ orb_status orb_map_slide(orb_map_run *c, double below) {
   if (!fits) {
     goto done;
   }
-  ORB_GO(status, draw(c, &level, s.to_mesh), done);
-  const double energy = orb_map_level_energy(&level);
-  if (energy <= c->params.slide.most * c->best_energy && energy < below && !orb_map_level_flips(&level) &&
-      orb_map_level_degree(&level) == 1) {
-    for (int32_t v = 0; v < level.count; v++) {
-      memcpy(c->best + 3 * (size_t)s.to_mesh[level.vertex[v]], level.x + 3 * (size_t)v, sizeof(double[3]));
-    }
-    c->best_energy = energy;
-  }
+  ORB_GO(status, orb_map_draw_whole(c, &level, s.to_mesh, NULL), done);
+  (void)orb_map_take_drawn(c, &level, s.to_mesh, fmin(below, c->params.slide.most * c->best_energy));
 done:
   orb_map_level_free(ctx, &level);
   orb_corner_table_free(ctx, &s);

@@ -1,7 +1,7 @@
 /* The last step towards targets, and of a landmark walk: the best map slides to where the two shapes fit each other in
  * space. */
-#ifndef ORB_ALIGN_MAP_SLIDE_H
-#define ORB_ALIGN_MAP_SLIDE_H
+#ifndef ORB_ALIGN_MAP_SPACE_SLIDE_H
+#define ORB_ALIGN_MAP_SPACE_SLIDE_H
 
 #include "align/map/engine/run.h"
 

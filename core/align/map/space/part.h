@@ -1,0 +1,15 @@
+/* Shapes of which only parts correspond: a head and a bust, say. */
+#ifndef ORB_ALIGN_MAP_SPACE_PART_H
+#define ORB_ALIGN_MAP_SPACE_PART_H
+
+#include "align/map/engine/run.h"
+
+/* Do the landmarks show that only a part of one shape corresponds to the other one? They do if nearly all distances
+ * between landmarks are larger on the same shape, though both shapes have the same area here. O(landmarks²). */
+ORB_MUST_CHECK orb_status orb_map_is_part(orb_map_run *run, int *is_part);
+
+/* Draws the best map to where the parts fit each other in space, unless that would raise its energy to more than
+ * params.part.most times what it is. Then sets run->fits_part. */
+ORB_MUST_CHECK orb_status orb_map_fit_part(orb_map_run *run);
+
+#endif
