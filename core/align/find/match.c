@@ -206,7 +206,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;
   orb_trials_list(t);
   ORB_TRY(write_ranking(t, out));
-  return orb_trials_refine(t);
+  return orb_trials_refine(t, out->bend > ORB_FIND_WALKS_FIRST ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
 }
 
 orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,

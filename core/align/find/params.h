@@ -18,6 +18,7 @@ enum {
                              grows with the square of this */
   ORB_FIND_FINE = 8000,   /* vertices of the finer copies on which the best match is settled: with 4000, fingers are too
                              coarse for starts to follow, and maps of 20 pairs have 2 % more energy */
+  ORB_FIND_FINE_BENT = 3000, /* the same where shapes bend more than ORB_FIND_WALKS_FIRST: walks take samples only */
   ORB_FIND_SETTLE = 3, /* rounds in which they settle: with 6, maps of 20 pairs of people are no nearer to the truth, */
   ORB_FIND_SETTLE_BENT = 6, /* but walks of shapes that bend more than ORB_FIND_WALKS_FIRST take samples of the targets,
                                and no slide follows: with 3, dog-walk to elephant-stand goes wrong */

@@ -48,10 +48,11 @@ orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_me
 
 static orb_status make_fine(orb_context *ctx, void *arg, int32_t s) {
   orb_trials *t = arg;
-  return make_copy(ctx, t, s, ORB_FIND_FINE, &t->fine[s]);
+  return make_copy(ctx, t, s, t->fine_size, &t->fine[s]);
 }
 
-orb_status orb_trials_refine(orb_trials *t) {
+orb_status orb_trials_refine(orb_trials *t, int32_t size) {
+  t->fine_size = size;
   return orb_tasks_run(t->ctx, 2, make_fine, t);
 }
 

@@ -34,8 +34,9 @@ typedef struct orb_trials {
   const orb_mesh *mesh[2]; /* borrowed */
   orb_trial_scaling scaling[2];
   orb_coarse_copy copy[2]; /* scaled */
-  orb_coarse_copy fine[2]; /* the same with ORB_FIND_FINE vertices, on which matches are settled; empty before
+  orb_coarse_copy fine[2]; /* the same with more vertices, on which matches are settled; empty before
                               orb_trials_refine() */
+  int32_t fine_size;       /* vertices of these */
   orb_hint_places hint;    /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
   orb_spectral_dense dense;
   int32_t *rotated[2]; /* the maps of the rotations, one after the other, laid out as in `dense` */
@@ -50,8 +51,8 @@ ORB_MUST_CHECK orb_status orb_trials_open(orb_context *ctx, const orb_mesh *firs
                                           orb_trials *trials);
 void orb_trials_close(orb_trials *trials);
 
-/* Makes the fine copies, once a match is found. */
-ORB_MUST_CHECK orb_status orb_trials_refine(orb_trials *trials);
+/* Makes the fine copies, with `size` vertices, once a match is found. */
+ORB_MUST_CHECK orb_status orb_trials_refine(orb_trials *trials, int32_t size);
 
 /* Makes the trials: spectral maps and rotations of the spheres. */
 ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);

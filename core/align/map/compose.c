@@ -367,20 +367,27 @@ static orb_status open_run(orb_map_run *c, const orb_map_guide *guide, double en
   return ORB_OK;
 }
 
-/* Untwists limbs. Then draws the map to where parts of the shapes fit in space, or slides where that may help. before:
- * the energy of the map as given. */
-static orb_status untwist_and_fit(orb_map_run *c, orb_map_from from, double before) {
-  const int is_hopeless = c->course.is_beaten || (c->given_target && c->best_energy > c->params.targets.hopeless);
+static int is_hopeless(const orb_map_run *c) {
+  return c->course.is_beaten || (c->given_target && c->best_energy > c->params.targets.hopeless);
+}
+
+/* Draws the map to where parts of the shapes fit in space, or slides where that may help. before: the energy of the map
+ * as given. */
+static orb_status fit_in_space(orb_map_run *c, orb_map_from from, double before) {
   int is_part;
-  if (is_hopeless || (from == ORB_MAP_FROM_WALK && !(c->best_energy < before))) {
-    return ORB_OK;
-  }
-  ORB_TRY(orb_map_untwist(c, INFINITY));
   ORB_TRY(orb_map_is_part(c, &is_part));
   if (is_part) {
     return orb_map_fit_part(c);
   }
   return should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
+}
+
+static orb_status untwist_and_fit(orb_map_run *c, orb_map_from from, double before) {
+  if (is_hopeless(c) || (from == ORB_MAP_FROM_WALK && !(c->best_energy < before))) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_map_untwist(c, INFINITY));
+  return fit_in_space(c, from, before);
 }
 
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
@@ -474,7 +481,9 @@ orb_status orb_map_draft_finish(orb_context *ctx, orb_map_draft *d, double *ener
 orb_status orb_map_draft_take(orb_context *ctx, orb_map_draft *d, double *energy) {
   int improved = 0;
   d->run.ctx = ctx;
-  ORB_TRY(untwist_and_fit(&d->run, ORB_MAP_FROM_SPACE, d->energy[0]));
+  if (!is_hopeless(&d->run)) {
+    ORB_TRY(fit_in_space(&d->run, ORB_MAP_FROM_SPACE, d->energy[0]));
+  }
   ORB_TRY(take_best(&d->run, d->fixed, d->energy, &improved));
   *energy = d->energy[1];
   return ORB_OK;

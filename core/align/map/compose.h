@@ -48,8 +48,9 @@ ORB_MUST_CHECK orb_status orb_map_draft_create(orb_context *ctx, orb_aligned_sha
 /* Makes the map of a draft with all vertices, once, on any context of the same root. *energy: of the map, or that of
  * the shapes as they are if it is no better. The shapes stay as they are. */
 ORB_MUST_CHECK orb_status orb_map_draft_finish(orb_context *ctx, orb_map_draft *draft, double *energy);
-/* Untwists limbs of a finished draft, and writes its map to the shapes, as orb_compose() does. *energy: of the map
- * afterwards. */
+/* Slides a finished draft where that may help, and writes its map to the shapes, as orb_compose() does. No limb is
+ * untwisted: of 46 pairs of unlike shapes that lowered the energy of one, by 0.005, for a tenth of the time of all.
+ * *energy: of the map afterwards. */
 ORB_MUST_CHECK orb_status orb_map_draft_take(orb_context *ctx, orb_map_draft *draft, double *energy);
 void orb_map_draft_free(orb_context *ctx, orb_map_draft *draft);
 

@@ -19,7 +19,8 @@ static orb_status loosen(orb_map_run *c, orb_map_level *l, int most) {
   return ORB_OK;
 }
 
-/* Optimises the levels up to the coarse one. Without guides, the energy becomes INFINITY where limbs are twisted. */
+/* Optimises the levels up to the coarse one. Without guides, the coarse one is loosened, and the energy becomes
+ * INFINITY where limbs are twisted. */
 static orb_status optimise(orb_map_run *c, int32_t guides, orb_map_walked *w) {
   const orb_map_params *p = &c->params;
   const int32_t n = c->vertex_count;
@@ -35,7 +36,7 @@ static orb_status optimise(orb_map_run *c, int32_t guides, orb_map_walked *w) {
       w->energy = INFINITY;
       break;
     }
-    if (first || last) {
+    if (first || (last && guides == 0)) {
       ORB_GO(status, loosen(c, &w->level, last ? p->walked.loosen_most : 1), done);
     }
     orb_map_level_store(c, &w->level, w->refiner);
@@ -102,9 +103,20 @@ done:
   return status;
 }
 
+/* Loosens the coarse level. */
+static orb_status loosen_coarse(orb_map_run *c, orb_map_walked *w) {
+  ORB_TRY(enter(c, w));
+  ORB_TRY(loosen(c, &w->level, c->params.walked.loosen_most));
+  orb_map_level_store(c, &w->level, w->refiner);
+  w->energy = orb_map_level_energy(&w->level);
+  return leave(c, w);
+}
+
+/* Loosening hardly changes which walk is the best one, so only that is loosened. */
 orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
   const orb_map_params *p = &c->params;
   const int64_t work = p->walked.work * (int64_t)c->vertex_count;
+  const double given = best->energy;
   const int most = c->beat.energy > 0 ? p->walked.beat_most : ORB_MAP_GUIDED;
   int agree = 0;
   for (int i = 0; i < most + ORB_MAP_GUIDED_FEW && best->energy > p->walked.enough && !agree; i++) {
@@ -123,7 +135,7 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
     orb_map_walked_free(c, &w);
     ORB_TRY(status);
   }
-  return ORB_OK;
+  return best->energy < given ? loosen_coarse(c, best) : ORB_OK;
 }
 
 orb_status orb_map_walked_refine(orb_map_run *c, orb_map_walked *w) {

@@ -14,11 +14,11 @@ typedef struct orb_map_walked {
   double energy; /* INFINITY: there is no map, or it is hopeless */
 } orb_map_walked;
 
-/* Walks, and optimises the levels up to the coarse one. guides: samples of the spatial targets that walk with the
- * pairs, and are free afterwards. Only a map without guides can be hopeless by its energy. Afterwards the run is as it
- * was. Free `out` in any case. */
+/* Walks, and optimises the levels up to the coarse one, which is loosened only without guides. guides: samples of the
+ * spatial targets that walk with the pairs, and are free afterwards. Only a map without guides can be hopeless by its
+ * energy. Afterwards the run is as it was. Free `out` in any case. */
 ORB_MUST_CHECK orb_status orb_map_walked_create(orb_map_run *run, int32_t guides, orb_map_walked *out);
-/* Walks with different numbers of guides; the map of least energy replaces `best` if it is better. */
+/* Walks with different numbers of guides; the map of least energy is loosened and replaces `best` if it is better. */
 ORB_MUST_CHECK orb_status orb_map_walked_improve(orb_map_run *run, orb_map_walked *best);
 void orb_map_walked_free(orb_map_run *run, orb_map_walked *walked);
 

@@ -80,7 +80,6 @@ typedef struct orb_map_params {
     int32_t coarse;
     int new_steps;    /* steps of a vertex that has just come back */
     double loosen;    /* strength of the barrier while a level is loosened */
-    double rigid;     /* energy of a level up to which nothing locks, so that only the last level is loosened */
     double pull;      /* of the spatial targets on the first level, */
     double pull_fall; /* and its factor from level to level */
   } level;
@@ -300,6 +299,7 @@ typedef struct orb_map_params {
     int32_t least_anchors;  /* that determine a similarity; with fewer, rigid registrations come first */
     int32_t rigid_samples;  /* controls of a rigid registration */
     int rigid_steps;        /* of each of the 24 */
+    int32_t rigid_search;   /* vertices of the fixed shape that it searches */
     double rigid_cap;       /* of a squared distance, so that parts without a counterpart do not decide */
     int32_t fixed_search;   /* vertices of the fixed shape beyond which only every second, third, … is searched */
     double normal_weight;   /* of |n − n'|² against |x − x'|² */

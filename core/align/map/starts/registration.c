@@ -132,12 +132,14 @@ ORB_CLONES static void measure(const float *at, int32_t columns, const float q[6
   }
 }
 
-/* Lays the fixed shape out for searches; empty columns lie at infinity. */
-static orb_status lay_out(targets_run *run) {
+/* Lays the fixed shape out for searches, with each `stride`-th of its vertices; empty columns lie at infinity. */
+static orb_status lay_out(targets_run *run, int32_t stride) {
   const orb_map_surface *b = run->b;
   const float weight = (float)sqrt(run->params->registration.normal_weight);
-  int32_t count = (b->vertex_count + run->stride - 1) / run->stride;
+  const int32_t count = (b->vertex_count + stride - 1) / stride;
+  run->stride = stride;
   run->columns = (count + BLOCK - 1) / BLOCK * BLOCK;
+  orb_free(run->ctx, run->searched);
   run->searched = ORB_NEW(run->ctx, float, 6 * (size_t)run->columns);
   if (!run->searched) {
     return ORB_E_NO_MEMORY;
@@ -388,9 +390,11 @@ static orb_status targets_compute(targets_run *run, double *out, double *fit) {
     base_of_anchors(run);
     ORB_TRY(spline_fit(run, run->anchors->count, p->registration.exact_stiffness));
   } else {
+    ORB_TRY(lay_out(run, 1 + run->b->vertex_count / p->registration.rigid_search));
     ORB_TRY(best_rigid(run));
     memcpy(run->base, run->s.weight, sizeof run->base);
   }
+  ORB_TRY(lay_out(run, 1 + run->b->vertex_count / p->registration.fixed_search));
   *fit = INFINITY;
   for (int round = 0; round < p->registration.rounds; round++) {
     double f = (double)round / (p->registration.rounds - 1);
@@ -407,14 +411,8 @@ orb_status orb_map_register_in_space(orb_context *ctx, const orb_map_params *par
                                      const double *x, const double *normal, int32_t vertex_count,
                                      const orb_map_anchors *anchors, double *out, double *fit) {
   size_t most = (size_t)params->registration.last_controls + (size_t)anchors->count;
-  targets_run run = {.ctx = ctx,
-                     .params = params,
-                     .b = b,
-                     .x = x,
-                     .normal = normal,
-                     .vertex_count = vertex_count,
-                     .anchors = anchors,
-                     .stride = 1 + b->vertex_count / params->registration.fixed_search};
+  targets_run run = {
+      .ctx = ctx, .params = params, .b = b, .x = x, .normal = normal, .vertex_count = vertex_count, .anchors = anchors};
   orb_status status = ORB_E_NO_MEMORY;
   run.control = ORB_NEW(ctx, int32_t, params->registration.last_controls);
   run.target = ORB_NEW(ctx, double, 3 * most);
@@ -424,9 +422,6 @@ orb_status orb_map_register_in_space(orb_context *ctx, const orb_map_params *par
   run.s.weight = ORB_NEW(ctx, double, 3 * most + 12);
   run.matrix = ORB_NEW(ctx, double, (most + 4) * (most + 4));
   if (run.control && run.target && run.mapped && run.distance && run.s.centre && run.s.weight && run.matrix) {
-    status = lay_out(&run);
-  }
-  if (status == ORB_OK) {
     status = targets_compute(&run, out, fit);
   }
   orb_free(ctx, run.searched);
