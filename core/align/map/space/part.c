@@ -49,7 +49,10 @@ orb_status orb_map_is_part(orb_map_run *c, int *is_part) {
     return ORB_E_NO_MEMORY;
   }
   const int32_t count = measure_ratios(c, landmarks, ratio);
-  *is_part = count > 0 && (ratio[count / 4] > scale || ratio[count - 1 - count / 4] < 1 / scale);
+  if (count > 0) {
+    const double low = ratio[count / 4], high = ratio[count - 1 - count / 4];
+    *is_part = (low > scale || high < 1 / scale) && high < c->params.part.spread * low;
+  }
   orb_free(c->ctx, ratio);
   return ORB_OK;
 }

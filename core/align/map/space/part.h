@@ -5,7 +5,8 @@
 #include "align/map/engine/run.h"
 
 /* Do the landmarks show that only a part of one shape corresponds to the other one? They do if nearly all distances
- * between landmarks are larger on the same shape, though both shapes have the same area here. O(landmarks²). */
+ * between landmarks are larger on the same shape by about the same factor, though both shapes have the same area here:
+ * longer limbs alone make some distances much larger than others. O(landmarks²). */
 ORB_MUST_CHECK orb_status orb_map_is_part(orb_map_run *run, int *is_part);
 
 /* Draws the best map to where the parts fit each other in space, unless that would raise its energy to more than
