@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "align/find/params.h"
-#include "align/map/compose.h"
+#include "align/map/draft.h"
 #include "align/map/engine/params.h"
 #include "base/check.h"
 #include "base/memory.h"

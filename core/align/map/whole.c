@@ -1,0 +1,169 @@
+/* The parts of a run are in the order in which it goes through them. */
+#include "align/map/whole.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/map/space/part.h"
+#include "align/map/space/slide.h"
+#include "align/map/starts/landmark_walk.h"
+#include "base/check.h"
+#include "base/memory.h"
+
+void orb_map_run_free(orb_map_run *c) {
+  orb_context *ctx = c->ctx;
+  orb_map_surface_free(ctx, &c->b);
+  orb_map_packed_free(ctx, &c->packed);
+  orb_free(ctx, c->x);
+  orb_free(ctx, c->normal);
+  orb_free(ctx, c->target);
+  orb_free(ctx, c->target_normal);
+  orb_free(ctx, c->target_place);
+  orb_free(ctx, c->doubted);
+  orb_free(ctx, c->keep);
+  orb_free(ctx, c->usable);
+  orb_hierarchy_destroy(ctx, c->hierarchy);
+  orb_free(ctx, c->position);
+  orb_free(ctx, c->local);
+  orb_free(ctx, c->place);
+  orb_free(ctx, c->start);
+  orb_free(ctx, c->best);
+  orb_free(ctx, c->fixed_points);
+  orb_free(ctx, c->kept.points);
+  orb_free(ctx, c->kept.fixed);
+  orb_free(ctx, c->pairs.moving);
+  orb_free(ctx, c->pairs.fixed);
+}
+
+orb_status orb_map_run_prepare(orb_map_run *c) {
+  orb_context *ctx = c->ctx;
+  const orb_mesh *mesh = &c->moving->mesh;
+  size_t n = (size_t)mesh->vertex_count;
+  c->vertex_count = mesh->vertex_count;
+  ORB_TRY(orb_map_surface_create(ctx, c->fixed, &c->b));
+  ORB_TRY(orb_map_packed_create(ctx, &c->fixed->mesh, &c->b, &c->packed));
+  c->x = ORB_NEW(ctx, double, 3 * n);
+  c->normal = ORB_NEW(ctx, double, 3 * n);
+  c->keep = ORB_NEW0(ctx, unsigned char, n);
+  c->usable = ORB_NEW0(ctx, unsigned char, n);
+  c->position = ORB_NEW(ctx, double, 3 * n);
+  c->local = ORB_NEW(ctx, int32_t, n);
+  c->place = ORB_NEW0(ctx, orb_place, n);
+  c->start = ORB_NEW(ctx, double, 3 * n);
+  c->best = ORB_NEW(ctx, double, 3 * n);
+  c->target = ORB_NEW(ctx, double, 3 * n);
+  c->target_normal = ORB_NEW(ctx, double, 3 * n);
+  c->target_place = ORB_NEW(ctx, orb_place, n);
+  c->doubted = ORB_NEW0(ctx, unsigned char, n);
+  if (!c->x || !c->normal || !c->keep || !c->usable || !c->position || !c->local || !c->place || !c->start ||
+      !c->best || !c->target || !c->target_normal || !c->target_place || !c->doubted) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_extent extent;
+  orb_mesh_extent(mesh, &extent);
+  double scale = extent.area > 0 ? sqrt(4 * M_PI / extent.area) : 1;
+  for (size_t i = 0; i < 3 * n; i++) {
+    c->x[i] = (mesh->positions[i] - 0.5 * extent.min[i % 3] - 0.5 * extent.max[i % 3]) * scale;
+  }
+  orb_map_normals(c->x, mesh->vertex_count, mesh->triangles, mesh->triangle_count, c->normal);
+  memcpy(c->start, c->moving->points, 3 * n * sizeof *c->start);
+  return ORB_OK;
+}
+
+/* A run of these two shapes. */
+orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
+                           int32_t landmark_count, const orb_map_guide *guide, orb_preset preset) {
+  const orb_map_params params = orb_map_params_of(preset);
+  return (orb_map_run){.ctx = ctx,
+                       .params = params,
+                       .fixed = fixed,
+                       .moving = moving,
+                       .both = both,
+                       .landmark_count = landmark_count,
+                       .given_target = guide->target,
+                       .keeps_angles = guide->keeps_angles,
+                       .beat = guide->beat,
+                       .rival = guide->rival,
+                       .wants_course = guide->course != NULL,
+                       .walks_first = guide->walks_first && both,
+                       .walks_early = guide->walks_early && both,
+                       .springs = guide->springs,
+                       .hopeless_flips = params.clear.hopeless,
+                       .passes = params.work.passes,
+                       .work = params.work.all * (int64_t)moving->mesh.vertex_count,
+                       .hopeless = INFINITY,
+                       .settled = INFINITY,
+                       .twisted_energy = INFINITY};
+}
+
+/* Measures the map as given and finds the pairs. energy: as of orb_compose(), both of the map as given. */
+orb_status orb_map_run_open(orb_map_run *c, const orb_map_guide *guide, double energy[2]) {
+  const orb_aligned_shape *moving = c->moving;
+  ORB_TRY(orb_map_run_prepare(c));
+  energy[0] = INFINITY;
+  if (guide->from != ORB_MAP_FROM_COPY) {
+    ORB_TRY(orb_map_energy_of(c, moving->points, c->params.energy.cap, &energy[0]));
+  }
+  memcpy(c->best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c->best);
+  c->best_energy = energy[0];
+  ORB_TRY(orb_map_pairs_create(c));
+  if ((guide->target && c->pairs.landmarks > 0) /* the landmarks are apart */ || guide->from == ORB_MAP_FROM_SPRINGS) {
+    energy[0] = c->best_energy = INFINITY;
+  }
+  energy[1] = energy[0];
+  return ORB_OK;
+}
+
+int orb_map_run_is_hopeless(const orb_map_run *c) {
+  return c->course.is_beaten || (c->given_target && c->best_energy > c->params.targets.hopeless);
+}
+
+/* Should the map slide? Yes, if it is good, or begins with targets on spheres that keep angles. A landmark walk of
+ * shapes of other kinds is no good map, and stays; so does a walk that came first because the shapes bend much: of 14
+ * such pairs and 20 of animals, none fitted in space. */
+static int should_slide(const orb_map_run *c, orb_map_from from) {
+  if (c->walks_first && c->course.is_walked) {
+    return 0;
+  }
+  return (c->given_target || from == ORB_MAP_FROM_WALK) &&
+         (c->best_energy <= c->params.energy.good || (c->given_target && c->keeps_angles));
+}
+
+/* Draws the map to where parts of the shapes fit in space, or slides where that may help. before: the energy of the map
+ * as given. */
+orb_status orb_map_run_fit(orb_map_run *c, orb_map_from from, double before) {
+  int is_part;
+  ORB_TRY(orb_map_is_part(c, &is_part));
+  if (is_part) {
+    return orb_map_fit_part(c);
+  }
+  return should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
+}
+
+/* Writes the best map back if it is better than the alignment as given, or fits parts, and is certified. */
+orb_status orb_map_run_take(orb_map_run *c, orb_aligned_shape *fixed, double energy[2], int *improved) {
+  orb_aligned_shape *shapes[2] = {c->moving, fixed};
+  orb_map_candidate best = {c->best, c->fixed_points, c->best_energy};
+  orb_certificate certificate[2] = {{.valid = 1}, {.valid = 1}};
+  best = !c->fits_part && c->kept.points && c->kept.energy <= best.energy ? c->kept : best;
+  const double *points[2] = {best.points, best.fixed};
+  if (!c->fits_part && !(best.energy < energy[0])) {
+    return ORB_OK;
+  }
+  for (int s = 0; s < 2; s++) {
+    const orb_mesh *mesh = &shapes[s]->mesh;
+    if (points[s]) {
+      ORB_TRY(
+          orb_certify(c->ctx, points[s], mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate[s]));
+    }
+  }
+  *improved = certificate[0].valid && certificate[1].valid;
+  for (int s = 0; s < 2 && *improved; s++) {
+    if (points[s]) {
+      memcpy(shapes[s]->points, points[s], 3 * (size_t)shapes[s]->mesh.vertex_count * sizeof *points[s]);
+      shapes[s]->certificate = certificate[s];
+      energy[1] = best.energy;
+    }
+  }
+  return ORB_OK;
+}
