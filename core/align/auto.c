@@ -76,7 +76,7 @@ static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, 
     return ORB_E_NO_MEMORY;
   }
   for (int32_t s = 1; s < shape_count; s++) {
-    ORB_TRY(orb_match_find(ctx, shapes[0].mesh, shapes[s].mesh, NULL, &m->of[s]));
+    ORB_TRY(orb_match_find(ctx, shapes[0].mesh, shapes[s].mesh, NULL, shape_count == 2, &m->of[s]));
     m->are_found = m->are_found && m->of[s].is_found;
     m->clear = fmin(m->clear, m->of[s].clear);
     m->lead = fmin(m->lead, m->of[s].lead);

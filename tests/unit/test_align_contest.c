@@ -36,7 +36,7 @@ static void hold(orb_context *ctx, const orb_align_shape shapes[2], outcome *out
   options.preset = ORB_PRESET_FAST; /* rotations only */
   assert_int_equal(orb_even_shapes_create(ctx, shapes, 2, &even), ORB_OK);
   assert_int_equal(orb_align(ctx, even.shapes, 2, NULL, 0, &options, &out->alignment), ORB_OK);
-  assert_int_equal(orb_match_find(ctx, shapes[0].mesh, shapes[1].mesh, NULL, &out->match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, shapes[0].mesh, shapes[1].mesh, NULL, 1, &out->match), ORB_OK);
   assert_true(orb_contest_is_open(&out->match, 1));
   assert_false(orb_contest_is_open(&out->match, 0));
   assert_int_equal(orb_contest_run(ctx, &out->match, ORB_PRESET_DEFAULT, &out->alignment, &out->won), ORB_OK);

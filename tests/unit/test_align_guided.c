@@ -55,7 +55,7 @@ static void dog_to_giraffe(void **state) {
   assert_int_equal(orb_even_shapes_create(ctx, shapes, 2, &even), ORB_OK);
   assert_int_equal(orb_align(ctx, even.shapes, 2, NULL, 0, &options, &alignment), ORB_OK);
   orb_even_shapes_free(ctx, &even);
-  assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, 1, &match), ORB_OK);
   assert_int_equal(orb_match_target(ctx, &match, 0, 1, &match.target), ORB_OK);
   const double *targets[2] = {NULL, match.target};
   const orb_aims aims = {.targets = targets, .keep_angles = 1, .walks_first = 1};

@@ -71,7 +71,7 @@ static void limbs_go_to_limbs(void **state) {
     orb_match match;
     assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
     orb_mesh mesh[2] = {creature_of(ctx, reach, 3, 0), creature_of(ctx, other, 4, thirds)};
-    assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
+    assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, 1, &match), ORB_OK);
     assert_true(match.is_found);
     assert_limbs(ctx, &match, mesh, 1, thirds);
     assert_limbs(ctx, &match, mesh, 0, thirds);
@@ -93,7 +93,7 @@ static void less_round_shape_moves(void **state) {
   const orb_mesh *const pairs[][2] = {{&lean, &round}, {&round, &lean}, {&lean, &lean}};
   static const int moves[] = {0, 1, 1};
   for (int i = 0; i < 3; i++) {
-    assert_int_equal(orb_match_find(ctx, pairs[i][0], pairs[i][1], NULL, &match), ORB_OK);
+    assert_int_equal(orb_match_find(ctx, pairs[i][0], pairs[i][1], NULL, 1, &match), ORB_OK);
     assert_true(match.is_found);
     assert_int_equal(match.moves, moves[i]);
     orb_match_free(ctx, &match);
@@ -110,7 +110,7 @@ static void others_differ(void **state) {
   orb_match match;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
   orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, reach, 4, 1);
-  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, 1, &match), ORB_OK);
   assert_in_range(match.other_count, 1, ORB_MATCH_OTHERS);
   double before = 1;
   for (int i = 0; i < match.other_count; i++) {
@@ -139,7 +139,7 @@ static void another_map_is_chosen(void **state) {
   double *target;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
   orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, reach, 4, 1);
-  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, 1, &match), ORB_OK);
   assert_in_range(match.other_count, 1, ORB_MATCH_OTHERS);
   const int32_t last = match.other_count - 1;
   const orb_match_pairs best = match.pairs, chosen = match.other[last].pairs;
@@ -207,7 +207,7 @@ static void symmetric_shapes_are_not_sure(void **state) {
   for (int levels = 3; levels < 5; levels++) {
     orb_match match;
     orb_mesh pear = pear_of(ctx, 4), box = box_of(ctx, levels);
-    assert_int_equal(orb_match_find(ctx, &pear, &box, NULL, &match), ORB_OK);
+    assert_int_equal(orb_match_find(ctx, &pear, &box, NULL, 1, &match), ORB_OK);
     assert_true(match.is_found && match.other_count > 0);
     assert_true(orb_match_confidence(match.bend, match.clear, match.lead, 1) < 0.8);
     orb_match_free(ctx, &match);
@@ -268,7 +268,7 @@ static void assert_match(const char *first, const char *second, int marks, const
   int found = shared_mesh(ctx, first, &mesh[0]);
   if (found) {
     assert_true(shared_mesh(ctx, second, &mesh[1]));
-    assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &best), ORB_OK);
+    assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, 1, &best), ORB_OK);
     int tips = 0;
     for (int k = 0; k < best.pairs.count; k++) {
       int at = nearest_of(&mesh[0], mark[0], marks, best.pairs.first[k]);

@@ -48,7 +48,8 @@ static void other_landmarks_show_no_part(void **state) {
   assert_false(is_part((const double[3]){1.2, 1.25, 1.3}, LANDMARKS));
   assert_false(is_part((const double[3]){1.4, 2, 3}, LANDMARKS)); /* limbs are longer, but not all alike */
   assert_false(is_part((const double[3]){1, 1, 3}, LANDMARKS));
-  assert_false(is_part((const double[3]){1.5, 1.5, 1.5}, 3)); /* too few to place a part */
+  assert_false(is_part((const double[3]){1.5, 1.5, 1.5}, 4)); /* too few to be sure */
+  assert_true(is_part((const double[3]){1.5, 1.5, 1.5}, 5));
 }
 
 int main(void) {

@@ -355,7 +355,7 @@ static void a_copy_is_matched(void **state) {
     p[2] = 10 * x;
   }
   orb_mesh_extent(&a, &extent);
-  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, 1, &match), ORB_OK);
   assert_true(match.is_found);
   assert_true(match.bend < 0.1); /* wrong limbs bend the same creature more, even on its own mesh: the test above */
   assert_true(match.lead > 2);
@@ -384,8 +384,8 @@ static void threads_change_nothing(void **state) {
   orb_context_options options = {.threads = 3};
   orb_context *three;
   assert_int_equal(orb_context_create(&options, &three), ORB_OK);
-  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &one), ORB_OK);
-  assert_int_equal(orb_match_find(three, &a, &b, NULL, &other), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, 1, &one), ORB_OK);
+  assert_int_equal(orb_match_find(three, &a, &b, NULL, 1, &other), ORB_OK);
   assert_true(one.is_found && other.is_found);
   assert_memory_equal(&one.pairs, &other.pairs, sizeof one.pairs);
   assert_int_equal(one.other_count, other.other_count);
@@ -407,7 +407,7 @@ static void few_vertices_are_matched_by_rotations(void **state) {
   (void)state;
   orb_mesh a = shape_icosahedron(ctx), b = shape_ball(ctx, 2);
   orb_match match;
-  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, 1, &match), ORB_OK);
   assert_true(match.is_found);
   assert_int_equal(orb_match_target(ctx, &match, 0, 1, &match.target), ORB_OK);
   for (int32_t i = 0; i < 3 * b.vertex_count; i++) {

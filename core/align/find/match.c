@@ -182,7 +182,7 @@ static int is_one_shape(const orb_trial *one, const orb_match_hint *hint, double
 }
 
 static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
-                      orb_match *out) {
+                      int walks, orb_match *out) {
   orb_trials *t = out->trials;
   double stretch = 0;
   ORB_TRY(orb_trials_open(ctx, first, second, t));
@@ -206,14 +206,14 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;
   orb_trials_list(t);
   ORB_TRY(write_ranking(t, out));
-  return orb_trials_refine(t, out->bend > ORB_FIND_WALKS_FIRST ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
+  return orb_trials_refine(t, walks && out->bend > ORB_FIND_WALKS_FIRST ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
 }
 
 orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
-                          orb_match *out) {
+                          int walks, orb_match *out) {
   memset(out, 0, sizeof *out);
   out->trials = ORB_NEW0(ctx, orb_trials, 1);
-  return out->trials ? run(ctx, first, second, hint, out) : ORB_E_NO_MEMORY;
+  return out->trials ? run(ctx, first, second, hint, walks, out) : ORB_E_NO_MEMORY;
 }
 
 orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving, double **target) {

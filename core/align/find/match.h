@@ -64,10 +64,11 @@ typedef struct orb_match {
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
  * poses. Only maps that take the first few landmarks near their partners count; the targets then take all landmarks
- * there. Free `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on all threads, and the
- * result has the same bytes for any number of them. */
+ * there. walks: landmark walks lead to the map of shapes that bend much; they need samples of the targets only, so
+ * these come from coarser copies. Free `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on
+ * all threads, and the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
-                                         const orb_match_hint *hint, orb_match *out);
+                                         const orb_match_hint *hint, int walks, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
  * other[n − 1]. moving: 0, the first shape, or 1, the second, which alone is drawn to landmarks. *target: the caller's
  * to free, also on failure; NULL if a degenerate shape cannot be registered back, which the best map excludes. The

@@ -76,7 +76,8 @@ typedef struct two_ways {
   posed posed;
   orb_alignment pinned; /* once has_tried_pins; empty if the pins have no room */
   int has_tried_pins, lacks_room;
-  int walked; /* the pins of two shapes meet in a map that a landmark walk has led to */
+  int fits_part; /* that map is drawn to where parts of the shapes fit, so its energy does not compare */
+  int walked;    /* the pins of two shapes meet in a map that a landmark walk has led to */
 } two_ways;
 
 /* Pins the landmarks, and improves the alignment of two shapes by a landmark walk. Its energy is INFINITY without one.
@@ -95,11 +96,13 @@ static orb_status try_pins(two_ways *c) {
   }
   a->energy = INFINITY;
   if (c->shape_count == 2) {
-    const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK};
+    orb_map_course course = {0};
+    const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK, .fits_parts = 1, .course = &course};
     double energies[2];
     ORB_TRY(orb_compose(c->ctx, &a->shapes[0], &a->shapes[1], 1, a->landmark_count, &walk, c->options->preset, energies,
                         &c->walked));
     a->energy = energies[1];
+    c->fits_part = course.fits_part;
   }
   return ORB_OK;
 }
@@ -141,13 +144,14 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
                                .second = vertex[1],
                                .stretch = ORB_FIND_HINT_STRETCH_MOST,
                                .sure = sure};
-  ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match), done);
+  ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, competes, &match), done);
   p->is_unsure |= match.is_unsure;
   if (match.is_found) {
     ORB_GO(status, orb_match_target(ctx, &match, 0, 1, &match.target), done);
     const int walks_first = competes && match.bend > ORB_FIND_WALKS_FIRST;
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE,
                                  .target = match.target,
+                                 .fits_parts = 1,
                                  .keeps_angles = keeps_angles,
                                  .rival = {competes ? ask_pins : NULL, c},
                                  .beat = {.energy = walks_first && c->walked ? c->pinned.energy : 0},
@@ -224,6 +228,10 @@ static orb_status improve(two_ways *c) {
   const orb_map_params params = orb_map_params_of(preset);
   const double good = params.energy.good, poor = params.energy.poor;
   posed *p = &c->posed;
+  if (c->fits_part) {
+    posed_free(c->ctx, p);
+    return ORB_OK;
+  }
   if (p->is_unsure && !p->is_found && c->pinned.energy > poor) {
     ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH_MOST));
   }

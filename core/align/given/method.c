@@ -93,6 +93,7 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
   aims = aims ? aims : &none;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     const orb_map_guide guide = {.from = from,
+                                 .fits_parts = alignment->landmark_count > 0,
                                  .target = aims->targets ? aims->targets[s] : NULL,
                                  .keeps_angles = aims->keep_angles,
                                  .beat = aims->beat,

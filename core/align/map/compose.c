@@ -22,6 +22,8 @@
  * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
  *
  * If spatial targets are given, other starts are used, and limbs are untwisted only at the end (targets.h). Then the
+ * map slides to where the shapes fit each other in space (space/slide.h), or it is drawn to where a part does
+ * (space/part.h), even if it had less energy before.
  *
  * Each start (start.h) is then refined up to all vertices, and no flip is allowed again. The map of least energy wins
  * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c), once before
@@ -219,6 +221,7 @@ done:
   return status;
 }
 
+/* The last steps. before: the energy of the map as given. */
 static orb_status untwist_and_fit(orb_map_run *c, orb_map_from from, double before) {
   if (orb_map_run_is_hopeless(c) || (from == ORB_MAP_FROM_WALK && !(c->best_energy < before))) {
     return ORB_OK;
@@ -248,12 +251,16 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, let_go(&c), done);
   } else if (guide->from == ORB_MAP_FROM_COPY) {
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
+    ORB_GO(status, orb_map_run_fit(&c, guide->from, energy[0]), done);
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
     ORB_GO(status, untwist_and_fit(&c, guide->from, energy[0]), done);
   }
-  if (guide->course) {
+  c.course.fits_part = c.fits_part;
+  if (c.wants_course) {
     ORB_GO(status, orb_map_energy_of(&c, c.best, c.params.energy.bulk, &c.course.bulk), done);
+  }
+  if (guide->course) {
     *guide->course = c.course;
   }
   status = orb_map_run_take(&c, fixed, energy, improved);

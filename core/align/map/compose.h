@@ -28,9 +28,10 @@
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed comes as near to an isometry as
  * possible. The landmarks (vertices of both shapes, whose points are already bit-equal) stay together. both: the fixed
  * shape's points may change too, which leaves more room, and the shapes may change places; else they stay as they are,
- * for further shapes. The result is certified and better than what was given; otherwise all points stay as they are and
- * *improved is 0. energy[2]: symmetric Dirichlet energy of the composed map, capped at 20 for each triangle and
- * weighted by area, before and after. Stage "align". */
+ * for further shapes. The result is certified and better than what was given, or fits parts of the shapes
+ * (space/part.h) and may have more energy; otherwise all points stay as they are and *improved is 0. energy[2]:
+ * symmetric Dirichlet energy of the composed map, capped at 20 for each triangle and weighted by area, before and
+ * after. Stage "align". */
 ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                                       int32_t landmark_count, const orb_map_guide *guide, orb_preset preset,
                                       double energy[2], int *improved);

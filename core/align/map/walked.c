@@ -36,7 +36,7 @@ static orb_status optimise(orb_map_run *c, int32_t guides, orb_map_walked *w) {
       w->energy = INFINITY;
       break;
     }
-    if (first || (last && guides == 0)) {
+    if (last ? guides == 0 : first) {
       ORB_GO(status, loosen(c, &w->level, last ? p->walked.loosen_most : 1), done);
     }
     orb_map_level_store(c, &w->level, w->refiner);
@@ -135,6 +135,7 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
     orb_map_walked_free(c, &w);
     ORB_TRY(status);
   }
+  c->work = c->work > work ? c->work : work;
   return best->energy < given ? loosen_coarse(c, best) : ORB_OK;
 }
 

@@ -82,9 +82,10 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                        .landmark_count = landmark_count,
                        .given_target = guide->target,
                        .keeps_angles = guide->keeps_angles,
+                       .may_fit_parts = guide->fits_parts,
                        .beat = guide->beat,
                        .rival = guide->rival,
-                       .wants_course = guide->course != NULL,
+                       .wants_course = guide->course && guide->target,
                        .walks_first = guide->walks_first && both,
                        .walks_early = guide->walks_early && both,
                        .springs = guide->springs,
@@ -132,12 +133,14 @@ static int should_slide(const orb_map_run *c, orb_map_from from) {
 /* Draws the map to where parts of the shapes fit in space, or slides where that may help. before: the energy of the map
  * as given. */
 orb_status orb_map_run_fit(orb_map_run *c, orb_map_from from, double before) {
-  int is_part;
-  ORB_TRY(orb_map_is_part(c, &is_part));
-  if (is_part) {
-    return orb_map_fit_part(c);
+  int is_part = 0;
+  if (c->may_fit_parts) {
+    ORB_TRY(orb_map_is_part(c, &is_part));
   }
-  return should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
+  if (is_part) {
+    ORB_TRY(orb_map_fit_part(c));
+  }
+  return !c->fits_part && should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
 }
 
 /* Writes the best map back if it is better than the alignment as given, or fits parts, and is certified. */
@@ -145,7 +148,7 @@ orb_status orb_map_run_take(orb_map_run *c, orb_aligned_shape *fixed, double ene
   orb_aligned_shape *shapes[2] = {c->moving, fixed};
   orb_map_candidate best = {c->best, c->fixed_points, c->best_energy};
   orb_certificate certificate[2] = {{.valid = 1}, {.valid = 1}};
-  best = !c->fits_part && c->kept.points && c->kept.energy <= best.energy ? c->kept : best;
+  best = c->kept.points && c->kept.energy <= best.energy ? c->kept : best;
   const double *points[2] = {best.points, best.fixed};
   if (!c->fits_part && !(best.energy < energy[0])) {
     return ORB_OK;

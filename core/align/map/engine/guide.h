@@ -37,6 +37,8 @@ typedef struct orb_map_level_map {
 typedef struct orb_map_course {
   double first_bulk, bulk; /* after the first start, and at last */
   int is_walked;           /* the first start is a landmark walk */
+  int fits_part;           /* the map is drawn to where parts of the shapes fit (space/part.h): energies do not tell
+                              how good it is */
   int is_beaten;           /* the first start does not beat what it must beat, or the rival, and is the last */
 } orb_map_course;
 
@@ -61,7 +63,8 @@ typedef struct orb_map_guide {
   int keeps_angles;     /* the spheres do (sheet/even.h); then embeddings made on the way do as well, and the places of
                            the targets are smoothed */
   orb_map_beat beat;    /* with a target */
-  orb_map_course *course; /* with a target: NULL, or set */
+  int fits_parts;       /* the landmarks may show that only parts of the shapes correspond (space/part.h) */
+  orb_map_course *course; /* NULL, or set; the bulks with a target only */
   orb_map_rival rival;    /* with a target: asked if the first start has led to no good map */
   int walks_first; /* with a target and `both`: a walk is tried before the start from the targets, and in its place
                     where it leads to a map */

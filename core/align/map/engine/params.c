@@ -85,7 +85,7 @@ static const orb_map_params DEFAULTS = {
     .iron = {.round = {{3, 2}, {2, 2}, {5, 2}, {3, 4}}, .enough = 1.1, .gain = 3e-3, .sweeps = 60, .loosen = 20},
     .draw = {.rounds = 5, .sweeps = 40, .clearings = 8, .pull = 20, .fall = 0.8},
     .slide = {.pull = 300, .sweeps = 60, .loosen = 40, .far = 0.1, .left = 0.01, .arrived = 0.8, .most = 1.1},
-    .part = {.scale = 1.32, .spread = 1.4, .off = 0.05, .facing = 0.8, .most = 2.5},
+    .part = {.scale = 1.32, .spread = 1.4, .off = 0.05, .facing = 0.8, .least = 0.3, .most = 2.5},
     .near = {.few = 30,
              .rings = 12,
              .usable_rings = 4,

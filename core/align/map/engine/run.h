@@ -73,6 +73,7 @@ typedef struct orb_map_run {
   double *start;    /* points of a map in which all pairs meet, mesh order: as given, later as walked */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
+  int may_fit_parts;      /* see orb_map_guide */
   int fits_part;          /* the best map is drawn to where parts of the shapes fit; its energy is no measure of it */
   double hopeless;        /* a start whose first map has more energy is given up */
   int32_t hopeless_flips; /* a start with more than one flip in this many triangles is given up */

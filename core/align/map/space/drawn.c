@@ -27,7 +27,8 @@ static orb_status draw_once(orb_map_run *c, orb_map_level *l, const int32_t *to_
   c->work = c->work > least ? c->work : least;
   orb_map_set_pull(c, l, to_mesh, p->slide.pull);
   for (int32_t v = 0; drawn && v < l->count; v++) {
-    l->pull[v] = drawn[to_mesh[l->vertex[v]]] ? l->pull[v] : 0;
+    const int is_spring = l->pull[v] != p->slide.pull * l->area[v];
+    l->pull[v] = is_spring || drawn[to_mesh[l->vertex[v]]] ? l->pull[v] : 0;
   }
   ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(p), p->slide.sweeps));
   return orb_map_loosen(c, l, p->clear.first_barrier, p->slide.loosen, p->slide.sweeps);

@@ -1,6 +1,7 @@
 /* The last steps of a map: it is drawn to where the two shapes fit each other in space.
  *
- * In: a run with a best map, and spatial targets. Out: a better best map, or the same. Read in this order:
+ * In: a run with a best map, and spatial targets. Out: another best map, which may have more energy, or the same. Read
+ * in this order:
  *
  *   slide.h  shapes that fit as wholes
  *   part.h   shapes of which only parts fit, as the landmarks tell
@@ -16,7 +17,8 @@
 ORB_MUST_CHECK orb_status orb_map_draw_whole(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh,
                                              const unsigned char *drawn);
 
-/* Makes the level the best map, unless it has flips, or its energy is `most` or more. Returns whether it has. */
+/* Makes the level the best map, unless it has flips, covers the sphere more than once, or has an energy of `most` or
+ * more. Returns whether it has. */
 int orb_map_take_drawn(orb_map_run *run, const orb_map_level *level, const int32_t *to_mesh, double most);
 
 #endif

@@ -13,7 +13,10 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-enum { LEAST_LANDMARKS = 4, MOST_LANDMARKS = 256 }; /* those after the latter do not count: time and room are squared */
+enum {
+  LEAST_LANDMARKS = 5,
+  MOST_LANDMARKS = 256 /* those that come after do not count: room grows with their square, time with their cube */
+};
 
 static int by_value(const void *a, const void *b) {
   const double x = *(const double *)a, y = *(const double *)b;
@@ -63,7 +66,7 @@ static orb_status register_by_landmarks(orb_map_run *c) {
   const int32_t samples = c->samples.count, pairs = c->pairs.count;
   c->given_target = NULL;
   c->samples.count = 0;
-  c->pairs.count = c->pairs.landmarks;
+  c->pairs.count = c->pairs.landmarks < MOST_LANDMARKS ? c->pairs.landmarks : MOST_LANDMARKS;
   orb_status status = orb_map_register(c, 0);
   c->given_target = given;
   c->samples.count = samples;
@@ -71,23 +74,31 @@ static orb_status register_by_landmarks(orb_map_run *c) {
   return status;
 }
 
-/* Marks the vertices that the registration lays onto the fixed shape, and makes their places there the targets. */
-static void mark_fitting(orb_map_run *c, unsigned char *fits) {
+/* Marks the vertices that the registration lays onto the fixed shape, and makes their places there the targets. Returns
+ * their share. */
+static double mark_fitting(orb_map_run *c, unsigned char *fits) {
+  int32_t count = 0;
   for (int32_t v = 0; v < c->vertex_count; v++) {
     double place[3], normal[3], *target = c->target + 3 * (size_t)v;
     orb_map_surface_at(&c->b, &c->target_place[v], place, NULL, normal);
     const double off = sqrt(orb_distance2(place, target));
     fits[v] = off < c->params.part.off && orb_dot(normal, c->target_normal + 3 * (size_t)v) > c->params.part.facing;
+    count += fits[v];
     for (int k = 0; k < 3; k++) {
       target[k] = place[k];
     }
   }
+  return (double)count / c->vertex_count;
 }
 
 orb_status orb_map_fit_part(orb_map_run *c) {
   orb_context *ctx = c->ctx;
   orb_corner_table s;
   orb_map_level level = {0};
+  ORB_TRY(orb_map_take_best(c)); /* a walk before may have set it aside */
+  if (!(c->best_energy < INFINITY)) {
+    return ORB_OK;
+  }
   ORB_TRY(orb_corner_table_create(ctx, &c->moving->mesh, &s));
   unsigned char *fits = ORB_NEW(ctx, unsigned char, c->vertex_count);
   orb_status status = fits ? ORB_OK : ORB_E_NO_MEMORY;
@@ -95,7 +106,9 @@ orb_status orb_map_fit_part(orb_map_run *c) {
     goto done;
   }
   ORB_GO(status, register_by_landmarks(c), done);
-  mark_fitting(c, fits);
+  if (mark_fitting(c, fits) < c->params.part.least) {
+    goto done;
+  }
   ORB_GO(status, orb_map_full_level(c, c->best, &s, &level), done);
   ORB_GO(status, orb_map_draw_whole(c, &level, s.to_mesh, fits), done);
   c->fits_part = orb_map_take_drawn(c, &level, s.to_mesh, c->params.part.most * c->best_energy);
