@@ -52,7 +52,7 @@ static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, orb_pr
   if (soft == 0 || alignment->shape_count < 2) {
     return ORB_OK;
   }
-  orb_map_guide guide = {.from = ORB_MAP_FROM_PINS};
+  orb_map_guide guide = {.from = ORB_MAP_FROM_PINS, .fits_parts = 1};
   orb_status status = springs_create(ctx, soft, &guide.springs);
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count && status == ORB_OK; s++) {

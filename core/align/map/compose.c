@@ -249,6 +249,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   ORB_GO(status, orb_map_run_open(&c, guide, energy), done);
   if (guide->from == ORB_MAP_FROM_PINS || guide->from == ORB_MAP_FROM_SPRINGS) {
     ORB_GO(status, let_go(&c), done);
+    ORB_GO(status, orb_map_run_fit(&c, guide->from, energy[0]), done);
   } else if (guide->from == ORB_MAP_FROM_COPY) {
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
     ORB_GO(status, orb_map_run_fit(&c, guide->from, energy[0]), done);
