@@ -89,15 +89,21 @@ static void each_index_once(void **state) {
   }
 }
 
-/* A thread that is slow, the caller among them, does not keep the others from its chunks. */
+/* A thread that is slow, the caller among them, does not keep the others from its chunks. A busy machine may let the
+ * other thread run too late once, but not each time. */
 static void others_take_over(void **state) {
   (void)state;
+  enum { TRIES = 20 };
   static record r;
   orb_context *made = context_of(2);
   r.threads = 2;
   for (r.slow = 0; r.slow < 2; r.slow++) {
-    int own = check_loop(made, &r, 0, 60, 1);
-    assert_in_range(own, r.slow ? 40 : 1, r.slow ? 60 : 20);
+    const int least = r.slow ? 40 : 1, most = r.slow ? 60 : 20;
+    int own = -1;
+    for (int i = 0; i < TRIES && (own < least || own > most); i++) {
+      own = check_loop(made, &r, 0, 60, 1);
+    }
+    assert_in_range(own, least, most);
   }
   orb_context_destroy(made);
 }
