@@ -257,7 +257,6 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, run(&c, guide->from, preset), done);
     ORB_GO(status, untwist_and_fit(&c, guide->from, energy[0]), done);
   }
-  c.course.fits_part = c.fits_part;
   if (c.wants_course) {
     ORB_GO(status, orb_map_energy_of(&c, c.best, c.params.energy.bulk, &c.course.bulk), done);
   }

@@ -141,8 +141,7 @@ orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *
     orb_map_set_pull(c, l, to_mesh, last ? 0 : pull);
     pull *= c->params.level.pull_fall;
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), count), done);
-    const int locks = !c->walks_first && orb_map_level_energy(l) > c->params.level.rigid;
-    if (!rough && (last || locks)) {
+    if (!rough && (last || (!c->walks_first && orb_map_level_energy(l) > c->params.level.rigid))) {
       ORB_GO(status, orb_map_loosen(c, l, c->params.level.loosen, count / 2, count / 2), done);
     }
     *failed = orb_map_level_flips(l) > 0 || (last && orb_map_level_degree(l) != 1);

@@ -23,8 +23,7 @@
 
 /* Each step gets its own work: a start that is given up must not starve the next. */
 static void allow(orb_map_run *c) {
-  int64_t least = c->params.targets.work * (int64_t)c->vertex_count;
-  c->work = c->work > least ? c->work : least;
+  orb_map_allow(c, c->params.targets.work);
 }
 
 /* The energy up to which a map is not improved. */

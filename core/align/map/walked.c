@@ -115,7 +115,6 @@ static orb_status loosen_coarse(orb_map_run *c, orb_map_walked *w) {
 /* Loosening hardly changes which walk is the best one, so only that is loosened. */
 orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
   const orb_map_params *p = &c->params;
-  const int64_t work = p->walked.work * (int64_t)c->vertex_count;
   const double given = best->energy;
   const int most = c->beat.energy > 0 ? p->walked.beat_most : ORB_MAP_GUIDED;
   int agree = 0;
@@ -124,7 +123,7 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
     if (i >= most && best->energy < INFINITY) {
       break;
     }
-    c->work = c->work > work ? c->work : work;
+    orb_map_allow(c, p->walked.work);
     orb_status status = orb_map_walked_create(c, i < most ? p->walked.guides[i] : p->walked.few[i - most], &w);
     agree = w.energy < INFINITY && fabs(w.energy - best->energy) <= p->walked.agree * (w.energy - 1);
     if (status == ORB_OK && w.energy < best->energy) {
@@ -135,7 +134,7 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
     orb_map_walked_free(c, &w);
     ORB_TRY(status);
   }
-  c->work = c->work > work ? c->work : work;
+  orb_map_allow(c, p->walked.work);
   return best->energy < given ? loosen_coarse(c, best) : ORB_OK;
 }
 

@@ -140,7 +140,7 @@ orb_status orb_map_run_fit(orb_map_run *c, orb_map_from from, double before) {
   if (is_part) {
     ORB_TRY(orb_map_fit_part(c));
   }
-  return !c->fits_part && should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
+  return !c->course.fits_part && should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
 }
 
 /* Writes the best map back if it is better than the alignment as given, or fits parts, and is certified. */
@@ -150,7 +150,7 @@ orb_status orb_map_run_take(orb_map_run *c, orb_aligned_shape *fixed, double ene
   orb_certificate certificate[2] = {{.valid = 1}, {.valid = 1}};
   best = c->kept.points && c->kept.energy <= best.energy ? c->kept : best;
   const double *points[2] = {best.points, best.fixed};
-  if (!c->fits_part && !(best.energy < energy[0])) {
+  if (!c->course.fits_part && !(best.energy < energy[0])) {
     return ORB_OK;
   }
   for (int s = 0; s < 2; s++) {

@@ -49,10 +49,16 @@ static void set_springs(const orb_map_run *c, orb_map_level *l, const int32_t *t
 }
 
 void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, double strength) {
+  orb_map_pull_drawn(c, l, to_mesh, strength, NULL);
+}
+
+void orb_map_pull_drawn(const orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, double strength,
+                        const unsigned char *drawn) {
   for (int32_t v = 0; v < l->count; v++) {
-    l->pull[v] = strength * l->area[v];
+    const int32_t m = to_mesh[l->vertex[v]];
+    l->pull[v] = !drawn || drawn[m] ? strength * l->area[v] : 0;
     if (strength > 0) {
-      memcpy(l->target + 3 * (size_t)v, c->target + 3 * (size_t)to_mesh[l->vertex[v]], sizeof(double[3]));
+      memcpy(l->target + 3 * (size_t)v, c->target + 3 * (size_t)m, sizeof(double[3]));
     }
   }
   if (c->springs.count > 0) {

@@ -12,6 +12,9 @@ orb_map_rules orb_map_hard(const orb_map_params *params);
 
 /* Pulls every vertex of the level to its spatial target; strength 0: none. Springs pull in any case. */
 void orb_map_set_pull(const orb_map_run *run, orb_map_level *level, const int32_t *to_mesh, double strength);
+/* The same for the vertices that are drawn, mesh order; NULL: all. */
+void orb_map_pull_drawn(const orb_map_run *run, orb_map_level *level, const int32_t *to_mesh, double strength,
+                        const unsigned char *drawn);
 
 /* The map of a level, to go back to. The density is not part of it: sweeps set it, single steps need
  * orb_map_level_refresh() first. */

@@ -33,6 +33,11 @@ orb_status orb_map_full_level(orb_map_run *c, const double *points, const orb_co
   return status;
 }
 
+void orb_map_allow(orb_map_run *c, int64_t steps) {
+  const int64_t least = steps * (int64_t)c->vertex_count;
+  c->work = c->work > least ? c->work : least;
+}
+
 orb_status orb_map_energy_of(orb_map_run *c, const double *points, double cap, double *energy) {
   orb_corner_table s;
   orb_map_level level = {0};

@@ -74,7 +74,6 @@ typedef struct orb_map_run {
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
   int may_fit_parts;      /* see orb_map_guide */
-  int fits_part;          /* the best map is drawn to where parts of the shapes fit; its energy is no measure of it */
   double hopeless;        /* a start whose first map has more energy is given up */
   int32_t hopeless_flips; /* a start with more than one flip in this many triangles is given up */
   double twisted_energy;  /* of the last map that was to be untwisted */
@@ -82,6 +81,9 @@ typedef struct orb_map_run {
   double settled;         /* energy of the map that the last pass brought no further: another pass would not either */
   int64_t work;           /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
+
+/* Leaves the run at least `steps` steps a vertex, so that a step that was given up does not starve the next one. */
+void orb_map_allow(orb_map_run *run, int64_t steps);
 
 /* The energy of the map with these points (mesh order), in which a triangle counts `cap` at most. O(n). */
 ORB_MUST_CHECK orb_status orb_map_energy_of(orb_map_run *run, const double *points, double cap, double *energy);

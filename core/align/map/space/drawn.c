@@ -23,13 +23,8 @@ static double share_left(const orb_map_run *c, const orb_map_level *l, const int
 
 static orb_status draw_once(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, const unsigned char *drawn) {
   const orb_map_params *p = &c->params;
-  const int64_t least = p->targets.work * (int64_t)c->vertex_count;
-  c->work = c->work > least ? c->work : least;
-  orb_map_set_pull(c, l, to_mesh, p->slide.pull);
-  for (int32_t v = 0; drawn && v < l->count; v++) {
-    const int is_spring = l->pull[v] != p->slide.pull * l->area[v];
-    l->pull[v] = is_spring || drawn[to_mesh[l->vertex[v]]] ? l->pull[v] : 0;
-  }
+  orb_map_allow(c, p->targets.work);
+  orb_map_pull_drawn(c, l, to_mesh, p->slide.pull, drawn);
   ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(p), p->slide.sweeps));
   return orb_map_loosen(c, l, p->clear.first_barrier, p->slide.loosen, p->slide.sweeps);
 }

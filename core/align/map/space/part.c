@@ -111,7 +111,7 @@ orb_status orb_map_fit_part(orb_map_run *c) {
   }
   ORB_GO(status, orb_map_full_level(c, c->best, &s, &level), done);
   ORB_GO(status, orb_map_draw_whole(c, &level, s.to_mesh, fits), done);
-  c->fits_part = orb_map_take_drawn(c, &level, s.to_mesh, c->params.part.most * c->best_energy);
+  c->course.fits_part = orb_map_take_drawn(c, &level, s.to_mesh, c->params.part.most * c->best_energy);
 done:
   orb_free(ctx, fits);
   orb_map_level_free(ctx, &level);

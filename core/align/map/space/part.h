@@ -9,8 +9,8 @@
  * longer limbs alone make some distances much larger than others. O(landmarks²). */
 ORB_MUST_CHECK orb_status orb_map_is_part(orb_map_run *run, int *is_part);
 
-/* Draws the best map to where the parts fit each other in space, and sets run->fits_part, unless few vertices fit, or
- * that would raise the energy to more than params.part.most times what it is. */
+/* Draws the best map to where the parts fit each other in space, and sets run->course.fits_part, unless few vertices
+ * fit, or that would raise the energy to more than params.part.most times what it is. */
 ORB_MUST_CHECK orb_status orb_map_fit_part(orb_map_run *run);
 
 #endif

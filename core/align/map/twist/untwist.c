@@ -188,9 +188,8 @@ orb_status orb_map_untwist(orb_map_run *c, double most_kept) {
   ORB_TRY(find_twists(c, c->best, &twists));
   orb_status status = ORB_OK;
   if (twists.count > 0 && twists.kept <= most_kept) {
-    int64_t least = c->params.work.untwist * (int64_t)c->vertex_count;
     c->twisted_energy = c->best_energy;
-    c->work = c->work > least ? c->work : least;
+    orb_map_allow(c, c->params.work.untwist);
     status = untwist_limbs(c, &twists);
   }
   orb_map_twists_free(c->ctx, &twists);
