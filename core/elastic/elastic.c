@@ -20,9 +20,10 @@ static const double FIRST_REACH = 0.6, LAST_REACH = 0.06;
 /* A pose to settle is carried from copies, and is off by about one of their edges. */
 static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
 
-orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, const orb_rough_map *map,
-                                const orb_elastic_anchors *anchors, orb_elastic_pose *pose, double *bend) {
-  orb_registration r = {.ctx = ctx, .map = map, .anchors = anchors, .pose = pose};
+orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, const orb_surroundings *around,
+                                const orb_rough_map *map, const orb_elastic_anchors *anchors, orb_elastic_pose *pose,
+                                double *bend) {
+  orb_registration r = {.ctx = ctx, .map = map, .anchors = anchors, .surroundings = around, .pose = pose};
   orb_status status;
   ORB_GO(status, orb_registration_create(ctx, a, b, &r), end);
   ORB_GO(status, orb_follow_rough_map(&r), end);

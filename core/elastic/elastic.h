@@ -10,6 +10,8 @@
  *   stretch.h   how the surroundings of a vertex are stretched
  *   relief.h    how far a vertex stands out from its surroundings
  *   pose.h      what leads the first mesh, and where it is
+ *   surroundings.h
+ *               what is around a vertex
  *   registration.h, rough_map.h, places.h, rounds.h
  *               what a registration holds, what pulls it, and its rounds
  *   elastic.h   the registration
@@ -23,15 +25,18 @@
 #define ORB_ELASTIC_ELASTIC_H
 
 #include "elastic/pose.h"
+#include "elastic/surroundings.h"
 
 /* Moves mesh a to mesh b along a rough map, then to the nearest places, and its anchors, if any, to theirs. Both meshes
- * are scaled to the same area, near 4π, and have no vertex without triangles. Fills the pose. *bend: mean squared
+ * are scaled to the same area, near 4π, and have no vertex without triangles. around: the surroundings of a, or NULL.
+ * Fills the pose. *bend: mean squared
  * change of the edges of a against the rotations of their ends, relative to their squared lengths. O(n · m) a round, 8
  * rounds, and O(n²) before them: about 0.015 s for two meshes of a thousand vertices. One thread; may run beside others
  * in loops of the context. */
 ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                                               const orb_rough_map *map, const orb_elastic_anchors *anchors,
-                                               orb_elastic_pose *pose, double *bend);
+                                               const orb_surroundings *around, const orb_rough_map *map,
+                                               const orb_elastic_anchors *anchors, orb_elastic_pose *pose,
+                                               double *bend);
 
 /* Moves mesh a to the nearest places of mesh b, and its anchors to theirs, from a pose near them, in so many rounds, at
  * least 2. Changes the pose. On all threads. */

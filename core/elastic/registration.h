@@ -8,13 +8,15 @@
 #include "elastic/relief.h"
 #include "elastic/searched.h"
 #include "elastic/stretch.h"
+#include "elastic/surroundings.h"
 #include "numeric/factor.h"
 
 typedef struct orb_registration {
   orb_context *ctx;
   orb_body a, b;
-  const orb_rough_map *map;           /* NULL: none */
-  const orb_elastic_anchors *anchors; /* NULL: none */
+  const orb_rough_map *map;             /* NULL: none */
+  const orb_elastic_anchors *anchors;   /* NULL: none */
+  const orb_surroundings *surroundings; /* of a; NULL: they are listed when they are needed */
   orb_factor *factor;
   orb_elastic_pose *pose;
   double *normal; /* of a in its pose */

@@ -9,13 +9,7 @@
 
 /* Lengths are those of surfaces of area 4π. Chosen by trial on the pairs of the half `choose` of
  * tests/bench/correspond.py, unless a line gives another reason. */
-enum {
-  MAP_ROUNDS = 2,  /* along the rough map alone; 8 change little */
-  SURROUNDINGS = 4 /* a vertex takes its first rotation from the images of its surroundings, one vertex in this many of
-                      the mesh. With one in 16, a limb's girth and as much of its length, noise of the rough map stays
-                      as twists: of 20 pairs, the right map then bends the shapes least in 17 instead of 19, and by a
-                      tenth more */
-};
+enum { MAP_ROUNDS = 2 }; /* along the rough map alone; 8 change little */
 /* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
 static const double MAP_REACH = 0.6;
 /* Distances at which a vertex of the rough map is an outlier and counts a quarter: at first, and in these rounds. */
@@ -39,59 +33,58 @@ void orb_pull_by_rough_map(orb_registration *r, double weight, double outlier) {
   }
 }
 
-/* The vertices around v, nearest rings first: `most` of them, if there are as many. mark: a number per vertex. */
-static int32_t list_surroundings(const orb_body *a, int32_t v, int32_t most, int32_t *mark, int32_t *list) {
-  int32_t count = 1;
-  list[0] = v;
-  mark[v] = v + 1;
-  for (int32_t k = 0; k < count; k++) {
-    for (int32_t i = a->start[list[k]]; i < a->start[list[k] + 1] && count < most; i++) {
-      if (mark[a->next[i]] != v + 1) {
-        mark[a->next[i]] = v + 1;
-        list[count++] = a->next[i];
-      }
+/* What the first rotation of a vertex is made of, in sums over its surroundings: mass, mass · x and mass · y, where y
+ * is the image of x; mass · y xᵀ by rows; and the same of normals. */
+enum { MASS, GIVEN, IMAGE = GIVEN + 3, OUTER = IMAGE + 3, MOMENTS = OUTER + 9 };
+
+static void fill_moments(const orb_registration *r, double *moment) {
+  memset(moment, 0, MOMENTS * (size_t)r->a.count * sizeof *moment);
+  for (int32_t v = 0; v < r->a.count; v++, moment += MOMENTS) {
+    const double mass = r->a.mass[v];
+    const size_t at = 3 * (size_t)v, to = 3 * (size_t)r->map->forth[v];
+    const double *x = r->a.mesh->positions + at, *y = r->b.mesh->positions + to;
+    moment[MASS] = mass;
+    for (int k = 0; k < 3; k++) {
+      moment[GIVEN + k] = mass * x[k];
+      moment[IMAGE + k] = mass * y[k];
     }
+    orb_add_outer(moment + OUTER, y, x, mass);
+    orb_add_outer(moment + OUTER, r->b.normal + to, r->a.normal + at, NORMAL_SHARE * mass);
   }
-  return count;
 }
 
 /* The rotation that carries these vertices best onto their images under the rough map. */
-static void rotation_of_map(const orb_registration *r, const int32_t *list, int32_t count, double rotation[9]) {
-  double mean[2][3] = {{0}}, all = 0, h[9] = {0};
-  const double *x = r->a.mesh->positions, *y = r->b.mesh->positions;
-  for (int32_t k = 0; k < count; k++) {
-    for (size_t i = 0; i < 3; i++) {
-      mean[0][i] += r->a.mass[list[k]] * x[3 * (size_t)list[k] + i];
-      mean[1][i] += r->a.mass[list[k]] * y[3 * (size_t)r->map->forth[list[k]] + i];
+static void rotation_of_map(const double *moment, const int32_t *list, int32_t count, double rotation[9]) {
+  double sum[MOMENTS] = {0};
+  for (int32_t i = 0; i < count; i++) {
+    const double *one = moment + MOMENTS * (size_t)list[i];
+    for (int k = 0; k < MOMENTS; k++) {
+      sum[k] += one[k];
     }
-    all += r->a.mass[list[k]];
   }
-  for (int i = 0; i < 6; i++) {
-    mean[i / 3][i % 3] /= all;
-  }
-  for (int32_t k = 0; k < count; k++) {
-    size_t v = 3 * (size_t)list[k], u = 3 * (size_t)r->map->forth[list[k]];
-    double p[3], q[3];
-    orb_sub(x + v, mean[0], p);
-    orb_sub(y + u, mean[1], q);
-    orb_add_outer(h, q, p, r->a.mass[list[k]]);
-    orb_add_outer(h, r->b.normal + u, r->a.normal + v, NORMAL_SHARE * r->a.mass[list[k]]);
-  }
-  (void)orb_nearest_rotation(h, rotation);
+  orb_add_outer(sum + OUTER, sum + IMAGE, sum + GIVEN, -1 / sum[MASS]);
+  (void)orb_nearest_rotation(sum + OUTER, rotation);
 }
 
 /* Sets the pose that the rough map gives directly. */
 static orb_status begin_from_map(orb_registration *r) {
-  const int32_t n = r->a.count, most = 1 + n / SURROUNDINGS;
-  int32_t *list = ORB_NEW(r->ctx, int32_t, most), *mark = ORB_NEW0(r->ctx, int32_t, n);
-  const orb_status status = list && mark ? ORB_OK : ORB_E_NO_MEMORY;
+  const int32_t n = r->a.count, most = orb_surroundings_most(n);
+  const orb_surroundings *known = r->surroundings;
+  int32_t *own = ORB_NEW(r->ctx, int32_t, most), *mark = ORB_NEW0(r->ctx, int32_t, n);
+  double *moment = ORB_NEW(r->ctx, double, MOMENTS *(size_t)n);
+  const orb_status status = own && mark && moment ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    fill_moments(r, moment);
+  }
   for (int32_t v = 0; v < n && status == ORB_OK; v++) {
-    const int32_t count = list_surroundings(&r->a, v, most, mark, list);
-    rotation_of_map(r, list, count, r->pose->rotation + 9 * (size_t)v);
+    const int32_t *list = known ? known->list + (size_t)v * (size_t)known->most : own;
+    const int32_t count = known ? known->size[v] : orb_surroundings_list(&r->a, v, most, mark, own);
+    rotation_of_map(moment, list, count, r->pose->rotation + 9 * (size_t)v);
     memcpy(r->pose->position + 3 * (size_t)v, r->b.mesh->positions + 3 * (size_t)r->map->forth[v], sizeof(double[3]));
   }
-  orb_free(r->ctx, list);
+  orb_free(r->ctx, own);
   orb_free(r->ctx, mark);
+  orb_free(r->ctx, moment);
   return status;
 }
 

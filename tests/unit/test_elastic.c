@@ -94,7 +94,7 @@ static void a_rotation_is_found(void **state) {
   int32_t *next = neighbours(&a);
   orb_rough_map map = {next, next};
   orb_elastic_pose pose = pose_of(&a);
-  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, NULL, &pose, &bend), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &b, NULL, &map, NULL, &pose, &bend), ORB_OK);
   assert_true(bend >= 0 && bend < 0.02);
   for (int32_t v = 0; v < a.vertex_count; v++) {
     worst = fmax(worst, distance(pose.position + 3 * (size_t)v, b.positions + 3 * (size_t)v));
@@ -128,7 +128,7 @@ static void a_bent_tube_is_found(void **state) {
   int32_t *next = neighbours(&a);
   orb_rough_map map = {next, next};
   orb_elastic_pose pose = pose_of(&a);
-  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, NULL, &pose, &bend), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &b, NULL, &map, NULL, &pose, &bend), ORB_OK);
   for (int32_t v = 0; v < a.vertex_count; v++) {
     sum += distance(pose.position + 3 * (size_t)v, b.positions + 3 * (size_t)v) / a.vertex_count;
   }
@@ -308,6 +308,29 @@ static void a_slide_is_the_same_on_any_threads(void **state) {
   push_close(&s[1]);
 }
 
+/* Surroundings that are listed beforehand change nothing. */
+static void surroundings_are_shared(void **state) {
+  (void)state;
+  orb_mesh a = creature(3);
+  scale_to_sphere(&a);
+  int32_t *near = neighbours(&a);
+  const orb_rough_map map = {near, near};
+  orb_surroundings around;
+  orb_elastic_pose pose[2] = {pose_of(&a), pose_of(&a)};
+  double bend[2];
+  assert_int_equal(orb_surroundings_create(ctx, &a, &around), ORB_OK);
+  for (int i = 0; i < 2; i++) {
+    assert_int_equal(orb_elastic_register(ctx, &a, &a, i ? &around : NULL, &map, NULL, &pose[i], &bend[i]), ORB_OK);
+  }
+  assert_memory_equal(pose[0].position, pose[1].position, 3 * (size_t)a.vertex_count * sizeof(double));
+  assert_memory_equal(&bend[0], &bend[1], sizeof(double));
+  orb_surroundings_free(ctx, &around);
+  pose_free(&pose[0]);
+  pose_free(&pose[1]);
+  orb_free(ctx, near);
+  shape_free(ctx, &a);
+}
+
 /* A map of the wrong limbs bends more. */
 static void wrong_limbs_bend(void **state) {
   (void)state;
@@ -329,8 +352,8 @@ static void wrong_limbs_bend(void **state) {
   }
   orb_rough_map identity = {same, same}, turned = {forth, back};
   orb_elastic_pose pose = pose_of(&a);
-  assert_int_equal(orb_elastic_register(ctx, &a, &a, &identity, NULL, &pose, &right), ORB_OK);
-  assert_int_equal(orb_elastic_register(ctx, &a, &a, &turned, NULL, &pose, &wrong), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &a, NULL, &identity, NULL, &pose, &right), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &a, NULL, &turned, NULL, &pose, &wrong), ORB_OK);
   assert_true(right < 0.01);
   assert_true(wrong > 0.1);
   pose_free(&pose);
@@ -471,6 +494,7 @@ int main(void) {
                                      cmocka_unit_test(an_anchor_leads_a_slide),
                                      cmocka_unit_test(a_slide_ends_where_shapes_do_not_fit),
                                      cmocka_unit_test(a_slide_is_the_same_on_any_threads),
+                                     cmocka_unit_test(surroundings_are_shared),
                                      cmocka_unit_test(wrong_limbs_bend),
                                      cmocka_unit_test(a_copy_is_matched),
                                      cmocka_unit_test(threads_change_nothing),

@@ -50,10 +50,10 @@ static orb_status walk(orb_context *ctx, void *arg, int32_t i) {
                               &c->draft[n], &c->energy[n]);
 }
 
-/* By how much the energy exceeds 1, times √(cost of the match relative to the best one). */
+/* By how much the energy exceeds 1, times the cost of the match relative to the best one. */
 static double score(const contest *c, int32_t n) {
   const double cost = n == SECOND || n == THIRD ? c->match->other[n - SECOND].cost : 1;
-  return c->energy[n] < INFINITY ? (c->energy[n] - 1) * sqrt(cost) : INFINITY;
+  return c->energy[n] < INFINITY ? (c->energy[n] - 1) * cost : INFINITY;
 }
 
 /* The contestant of least score but for `omit`, or −1. */
@@ -82,9 +82,10 @@ static void drop_worse(orb_context *ctx, contest *c) {
   }
 }
 
-/* The two best matches walk first. If both walks are poor, the third match and what fits best in space walk too. */
+/* The best match walks first, and the second one beside it if it costs little more. If these walks are poor, the third
+ * match and what fits best in space walk too. */
 static orb_status walk_all(orb_context *ctx, contest *c) {
-  c->count = 2;
+  c->count = c->match->other[0].cost <= ORB_FIND_CONTEST_BEHIND ? 2 : 1;
   c->round[0] = BEST;
   c->round[1] = SECOND;
   ORB_TRY(orb_tasks_run(ctx, c->count, walk, c));

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/extended.h"
 #include "align/find/params.h"
 #include "align/find/trials.h"
 #include "align/map/engine/spread.h"
@@ -89,7 +90,8 @@ static orb_status draw_to_landmarks(orb_context *ctx, const orb_trials *t, orb_t
   ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, copy, &anchors), end);
   ORB_GO(status, orb_trial_pose_create(ctx, copy, &drawn), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};
-  ORB_GO(status, orb_elastic_register(ctx, copy, &t->copy[0].mesh, &one->map[1], &held, &drawn, &bend), end);
+  ORB_GO(status, orb_elastic_register(ctx, copy, &t->copy[0].mesh, &t->around[1], &one->map[1], &held, &drawn, &bend),
+         end);
   if (bend <= ORB_FIND_DRAWN_BEND * one->bend[1]) {
     const orb_elastic_pose before = one->pose[1];
     one->pose[1] = drawn;
@@ -201,6 +203,9 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->is_unsure = !is_one_shape(&t->trial[best], hint, stretch);
   if (out->is_unsure) {
     return ORB_OK;
+  }
+  if (!hint) {
+    ORB_TRY(orb_trials_extend(t));
   }
   out->is_found = 1;
   out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;

@@ -5,6 +5,8 @@
  *
  *   hint.h    what landmarks say of a match
  *   trials.h  rough maps, registered and ranked
+ *   agreed.h, extended.h
+ *             rough maps that follow from the part on which a trial agrees with its way back
  *   match.h   the best of them, its pairs and its targets
  *   found.h   the landmarks that an alignment found, and their confidence
  *   contest.h which of the best matches leads to the better map
@@ -16,7 +18,8 @@
  * limbs bends the copies least, even if it is off at their tips. A twin (left and right swapped with front and back)
  * bends them more, and often also rotates them in space.
  *
- * Where shapes bend much, neither is sure, and the walks towards the two best matches decide (contest.h).
+ * Where shapes bend much, the best maps are extended (extended.h), and the walks towards the two best matches decide if
+ * their costs are near (contest.h).
  *
  * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on
  * the course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by

@@ -112,7 +112,7 @@ static orb_status carry_landmarks(orb_context *ctx, const side *from, const side
   if (status != ORB_OK) {
     goto end;
   }
-  ORB_GO(status, orb_elastic_register(ctx, &from->copy.mesh, &to->copy.mesh, &map, NULL, &pose, &bend), end);
+  ORB_GO(status, orb_elastic_register(ctx, &from->copy.mesh, &to->copy.mesh, NULL, &map, NULL, &pose, &bend), end);
   ORB_GO(status, orb_elastic_carry(ctx, &from->copy.mesh, &pose, at, count, &carried), end);
   ORB_GO(status, orb_nearest_create(ctx, to->mesh->positions, to->mesh->triangles, to->mesh->triangle_count, &tree),
          end);

@@ -36,7 +36,8 @@ static orb_status make_copy(orb_context *ctx, const orb_trials *t, int s, int32_
 static orb_status make_coarse(orb_context *ctx, void *arg, int32_t s) {
   orb_trials *t = arg;
   scaling_of(t->mesh[s], &t->scaling[s]);
-  return make_copy(ctx, t, s, ORB_FIND_COARSE, &t->copy[s]);
+  ORB_TRY(make_copy(ctx, t, s, ORB_FIND_COARSE, &t->copy[s]));
+  return orb_surroundings_create(ctx, &t->copy[s].mesh, &t->around[s]);
 }
 
 orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, orb_trials *t) {
@@ -142,11 +143,9 @@ orb_status orb_trials_make(orb_trials *t) {
   return add_rotations(t);
 }
 
-/* Registers a trial in one direction. */
-static orb_status register_trial(orb_context *ctx, orb_trials *t, int32_t number, int s) {
-  orb_trial *one = &t->trial[number];
-  return orb_elastic_register(ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &one->map[s], NULL, &one->pose[s],
-                              &one->bend[s]);
+orb_status orb_trial_register(orb_context *ctx, const orb_trials *t, orb_trial *one, int s) {
+  return orb_elastic_register(ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &t->around[s], &one->map[s], NULL,
+                              &one->pose[s], &one->bend[s]);
 }
 
 /* Trials that are registered at once. */
@@ -158,7 +157,7 @@ typedef struct registered {
 
 static orb_status register_one(orb_context *ctx, void *arg, int32_t i) {
   const registered *all = arg;
-  return register_trial(ctx, all->t, all->trial[i], all->direction);
+  return orb_trial_register(ctx, all->t, &all->t->trial[all->trial[i]], all->direction);
 }
 
 /* Registers the trials that are not dropped in one direction, side by side. */
@@ -196,7 +195,7 @@ static double rotation_of(const orb_trials *t, const orb_trial *one, int s) {
   return acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
 }
 
-static void fill_cost(const orb_trials *t, orb_trial *one, int directions) {
+void orb_trial_fill_cost(const orb_trials *t, orb_trial *one, int directions) {
   double bend = 0;
   for (int s = 0; s < directions; s++) {
     bend += one->bend[s] / directions;
@@ -236,7 +235,7 @@ static int any_agrees(const orb_trials *t) {
 static void fill_costs(orb_trials *t, int directions) {
   for (int32_t i = 0; i < t->count; i++) {
     if (t->trial[i].cost < INFINITY) {
-      fill_cost(t, &t->trial[i], directions);
+      orb_trial_fill_cost(t, &t->trial[i], directions);
     }
   }
 }
@@ -334,8 +333,8 @@ void orb_trials_list(orb_trials *t) {
 }
 
 orb_status orb_trials_complete(orb_context *ctx, orb_trials *t, int32_t number) {
-  ORB_TRY(register_trial(ctx, t, number, 1));
-  fill_cost(t, &t->trial[number], 2);
+  ORB_TRY(orb_trial_register(ctx, t, &t->trial[number], 1));
+  orb_trial_fill_cost(t, &t->trial[number], 2);
   return ORB_OK;
 }
 
@@ -343,10 +342,13 @@ void orb_trials_close(orb_trials *t) {
   for (int32_t i = 0; i < t->count; i++) {
     orb_trial_pose_free(t->ctx, &t->trial[i].pose[0]);
     orb_trial_pose_free(t->ctx, &t->trial[i].pose[1]);
+    orb_free(t->ctx, t->trial[i].own[0]);
+    orb_free(t->ctx, t->trial[i].own[1]);
   }
   for (int s = 0; s < 2; s++) {
     orb_coarse_copy_free(t->ctx, &t->copy[s]);
     orb_coarse_copy_free(t->ctx, &t->fine[s]);
+    orb_surroundings_free(t->ctx, &t->around[s]);
     orb_free(t->ctx, t->rotated[s]);
   }
   orb_hint_places_free(t->ctx, &t->hint);

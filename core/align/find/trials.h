@@ -7,6 +7,7 @@
 
 #include "align/find/hint.h"
 #include "align/find/params.h"
+#include "elastic/surroundings.h"
 #include "spectral/spectral.h"
 
 enum {
@@ -19,9 +20,10 @@ typedef struct orb_trial {
   orb_rough_map map[2];
   orb_elastic_pose pose[2];
   double bend[2];
-  double rough; /* cost in the first direction alone */
-  double cost;  /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
-                   INFINITY as  well, its poses may not be set */
+  double rough;    /* cost in the first direction alone */
+  int32_t *own[2]; /* the rough map, if it is an extended one; else NULL */
+  double cost; /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
+                  INFINITY as  well, its poses may not be set */
 } orb_trial;
 
 /* How a shape is scaled: to area 4π, around the middle of its box. */
@@ -33,11 +35,12 @@ typedef struct orb_trials {
   orb_context *ctx;
   const orb_mesh *mesh[2]; /* borrowed */
   orb_trial_scaling scaling[2];
-  orb_coarse_copy copy[2]; /* scaled */
-  orb_coarse_copy fine[2]; /* the same with more vertices, on which matches are settled; empty before
-                              orb_trials_refine() */
-  int32_t fine_size;       /* vertices of these */
-  orb_hint_places hint;    /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
+  orb_coarse_copy copy[2];    /* scaled */
+  orb_surroundings around[2]; /* of their vertices */
+  orb_coarse_copy fine[2];    /* the same with more vertices, on which matches are settled; empty before
+                                 orb_trials_refine() */
+  int32_t fine_size;          /* vertices of these */
+  orb_hint_places hint;       /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
   orb_spectral_dense dense;
   int32_t *rotated[2]; /* the maps of the rotations, one after the other, laid out as in `dense` */
   orb_trial trial[ORB_TRIALS_MAX];
@@ -72,6 +75,13 @@ void orb_trials_list(orb_trials *trials);
 
 /* Registers trial `number` in the second direction, and sets its cost by both. */
 ORB_MUST_CHECK orb_status orb_trials_complete(orb_context *ctx, orb_trials *trials, int32_t number);
+
+/* Registers a trial of these copies in direction s, along its maps: fills its pose and its bend. May run beside others.
+ */
+ORB_MUST_CHECK orb_status orb_trial_register(orb_context *ctx, const orb_trials *trials, orb_trial *one, int s);
+
+/* Sets the cost of a trial by the first direction or by both, which must have been registered. */
+void orb_trial_fill_cost(const orb_trials *trials, orb_trial *one, int directions);
 
 /* Room for a pose of a mesh; free it in any case. */
 ORB_MUST_CHECK orb_status orb_trial_pose_create(orb_context *ctx, const orb_mesh *mesh, orb_elastic_pose *out);
