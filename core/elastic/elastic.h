@@ -28,11 +28,10 @@
 #include "elastic/surroundings.h"
 
 /* Moves mesh a to mesh b along a rough map, then to the nearest places, and its anchors, if any, to theirs. Both meshes
- * are scaled to the same area, near 4π, and have no vertex without triangles. around: the surroundings of a, or NULL.
- * Fills the pose. *bend: mean squared
- * change of the edges of a against the rotations of their ends, relative to their squared lengths. O(n · m) a round, 8
- * rounds, and O(n²) before them: about 0.015 s for two meshes of a thousand vertices. One thread; may run beside others
- * in loops of the context. */
+ * are scaled to the same area, near 4π, and have no vertex without triangles. around: the surroundings of a, which
+ * several calls may share, or NULL. Fills the pose. *bend: mean squared change of the edges of a against the rotations
+ * of their ends, relative to their squared lengths. O(n · m) a round, 8 rounds, and O(n²) before them: about 0.015 s
+ * for two meshes of a thousand vertices. One thread; may run beside others in loops of the context. */
 ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                                const orb_surroundings *around, const orb_rough_map *map,
                                                const orb_elastic_anchors *anchors, orb_elastic_pose *pose,

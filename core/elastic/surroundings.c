@@ -35,7 +35,7 @@ orb_status orb_surroundings_create(orb_context *ctx, const orb_mesh *mesh, orb_s
   orb_body body = {0};
   int32_t *mark = ORB_NEW0(ctx, int32_t, n);
   orb_status status = ORB_E_NO_MEMORY;
-  *out = (orb_surroundings){.count = n, .most = orb_surroundings_most(n)};
+  *out = (orb_surroundings){.most = orb_surroundings_most(n)};
   out->size = ORB_NEW(ctx, int32_t, n);
   out->list = ORB_NEW(ctx, int32_t, (size_t)n * (size_t)out->most);
   if (!mark || !out->size || !out->list) {

@@ -7,7 +7,7 @@
 
 /* The surroundings of vertex v are list[v · most] and the next ones, size[v] of them, nearest rings first. */
 typedef struct orb_surroundings {
-  int32_t count, most;
+  int32_t most;
   int32_t *size, *list;
 } orb_surroundings;
 

@@ -286,12 +286,7 @@ test('holes of a later shape stay filled, and the report names them', async (t) 
 
 /** The largest distance of points of a surface from triangles, which are near to each other. */
 const fromSurface = (points, { positions, triangles }) =>
-  Math.max(
-    ...points.map((p) =>
-      // A triangle without area lies on the edges of others and has no plane.
-      Math.min(...triangles.map((t) => toTriangle(p, ...t.map((v) => positions[v]))).filter((d) => !Number.isNaN(d))),
-    ),
-  );
+  Math.max(...points.map((p) => Math.min(...triangles.map((t) => toTriangle(p, ...t.map((v) => positions[v]))))));
 
 /** A face without its back, which the map squeezes at the rim: edges that cross it need many splits there. */
 const face = (levels, bend, from, angle) =>

@@ -139,8 +139,8 @@ static void weigh_marks(orb_agreed *a) {
   }
 }
 
-/* Takes the weight of all marks but this share of them, which are nearest to the others on the first mesh: without the
- * limbs, no wrong limb has a say. */
+/* Only this share of the marks keeps its weight: those nearest to the others on the first mesh. Marks on limbs are the
+ * outer ones, so no wrong limb has a say. */
 static void keep_inner(orb_agreed *a, double share) {
   double apart[ORB_AGREED_MARKS], rising[ORB_AGREED_MARKS];
   for (int32_t i = 0; i < a->count; i++) {

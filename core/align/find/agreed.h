@@ -33,9 +33,9 @@ ORB_MUST_CHECK orb_status orb_agreed_create(orb_context *ctx, const orb_mesh *fi
 void orb_agreed_free(orb_context *ctx, orb_agreed *agreed);
 
 /* Fills forth and back, a vertex of the other mesh for each vertex. position[s]: where a registration takes mesh s, in
- * the space of the other one (3 per vertex). inner: the share of the marks that count, those nearest to the
- * others; 1: all. *extended 0: too little agrees, or nearly all, and they are not filled.
- * O(marks · n²): about 0.03 s of one thread. */
+ * the space of the other one (3 per vertex). inner: the share of the marks that count, those nearest to the others; 1:
+ * all. *extended 0: too little agrees, or nearly all, and they are not filled. O(marks · n²): about 0.03 s of one
+ * thread. */
 ORB_MUST_CHECK orb_status orb_agreed_extend(orb_context *ctx, orb_agreed *agreed, const double *const position[2],
                                             double inner, int32_t *forth, int32_t *back, int *extended);
 

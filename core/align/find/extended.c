@@ -15,14 +15,7 @@ typedef struct chains {
   double most; /* cost of a trial that is extended again */
 } chains;
 
-static void free_trial(orb_context *ctx, orb_trial *one) {
-  for (int s = 0; s < 2; s++) {
-    orb_trial_pose_free(ctx, &one->pose[s]);
-    orb_free(ctx, one->own[s]);
-  }
-}
-
-/* A trial of its own, which lies where `one` lies. */
+/* Copies the positions of a trial. `out` has its own maps, still to be filled, and no cost. */
 static orb_status copy_trial(orb_context *ctx, const orb_trials *t, const orb_trial *one, orb_trial *out) {
   *out = (orb_trial){.cost = INFINITY, .rough = INFINITY};
   for (int s = 0; s < 2; s++) {
@@ -55,7 +48,8 @@ static orb_status extend(orb_context *ctx, const orb_trials *t, orb_agreed *agre
   return ORB_OK;
 }
 
-/* The course goes on where an extension costs a little more, since the next one may cost less than all before. */
+/* Extends one trial again and again. An extension may cost a little more than the one before, since the next one may
+ * cost less than both. */
 static orb_status run_chain(orb_context *ctx, void *arg, int32_t i) {
   const chains *all = arg;
   orb_trials *t = all->t;
@@ -73,7 +67,7 @@ static orb_status run_chain(orb_context *ctx, void *arg, int32_t i) {
     const double cost = next.cost;
     if (next.cost < best->cost) {
       ORB_GO(status, copy_trial(ctx, t, &next, &last), end);
-      free_trial(ctx, best);
+      orb_trial_free(ctx, best);
       *best = next;
       next = last;
       last = (orb_trial){0};
@@ -83,25 +77,33 @@ static orb_status run_chain(orb_context *ctx, void *arg, int32_t i) {
     }
   }
 end:
-  free_trial(ctx, &next);
-  free_trial(ctx, &last);
+  orb_trial_free(ctx, &next);
+  orb_trial_free(ctx, &last);
   orb_agreed_free(ctx, &agreed);
   return status;
 }
 
-/* Lists the trials of least cost. */
+static int is_listed(const chains *all, int32_t i) {
+  int listed = 0;
+  for (int32_t k = 0; k < all->count; k++) {
+    listed |= all->trial[k] == i;
+  }
+  return listed;
+}
+
+/* Lists the trials of least cost, the best first. */
 static void list_best(chains *all) {
-  const orb_trials *t = all->t;
-  for (int32_t i = 0; i < t->count; i++) {
-    int32_t k = all->count < ORB_FIND_EXTENDED ? all->count : ORB_FIND_EXTENDED - 1;
-    if (!(t->trial[i].cost < (all->count < ORB_FIND_EXTENDED ? INFINITY : t->trial[all->trial[k]].cost))) {
-      continue;
+  const orb_trial *trial = all->t->trial;
+  for (int32_t next = 0; next >= 0 && all->count < ORB_FIND_EXTENDED;) {
+    next = -1;
+    for (int32_t i = 0; i < all->t->count; i++) {
+      if (!is_listed(all, i) && trial[i].cost < (next < 0 ? INFINITY : trial[next].cost)) {
+        next = i;
+      }
     }
-    for (; k > 0 && t->trial[i].cost < t->trial[all->trial[k - 1]].cost; k--) {
-      all->trial[k] = all->trial[k - 1];
+    if (next >= 0) {
+      all->trial[all->count++] = next;
     }
-    all->trial[k] = i;
-    all->count += all->count < ORB_FIND_EXTENDED;
   }
 }
 

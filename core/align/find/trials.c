@@ -36,8 +36,7 @@ static orb_status make_copy(orb_context *ctx, const orb_trials *t, int s, int32_
 static orb_status make_coarse(orb_context *ctx, void *arg, int32_t s) {
   orb_trials *t = arg;
   scaling_of(t->mesh[s], &t->scaling[s]);
-  ORB_TRY(make_copy(ctx, t, s, ORB_FIND_COARSE, &t->copy[s]));
-  return orb_surroundings_create(ctx, &t->copy[s].mesh, &t->around[s]);
+  return make_copy(ctx, t, s, ORB_FIND_COARSE, &t->copy[s]);
 }
 
 orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, orb_trials *t) {
@@ -67,6 +66,13 @@ orb_status orb_trial_pose_create(orb_context *ctx, const orb_mesh *mesh, orb_ela
   out->position = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
   out->rotation = ORB_NEW(ctx, double, 9 * (size_t)mesh->vertex_count);
   return out->position && out->rotation ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+void orb_trial_free(orb_context *ctx, orb_trial *one) {
+  for (int s = 0; s < 2; s++) {
+    orb_trial_pose_free(ctx, &one->pose[s]);
+    orb_free(ctx, one->own[s]);
+  }
 }
 
 /* Poses of a trial, both of its maps in both directions. */
@@ -138,7 +144,13 @@ static orb_status add_rotations(orb_trials *t) {
   return ORB_OK;
 }
 
+static orb_status list_surroundings(orb_context *ctx, void *arg, int32_t s) {
+  orb_trials *t = arg;
+  return orb_surroundings_create(ctx, &t->copy[s].mesh, &t->around[s]);
+}
+
 orb_status orb_trials_make(orb_trials *t) {
+  ORB_TRY(orb_tasks_run(t->ctx, 2, list_surroundings, t));
   ORB_TRY(add_spectral(t));
   return add_rotations(t);
 }
@@ -340,10 +352,7 @@ orb_status orb_trials_complete(orb_context *ctx, orb_trials *t, int32_t number) 
 
 void orb_trials_close(orb_trials *t) {
   for (int32_t i = 0; i < t->count; i++) {
-    orb_trial_pose_free(t->ctx, &t->trial[i].pose[0]);
-    orb_trial_pose_free(t->ctx, &t->trial[i].pose[1]);
-    orb_free(t->ctx, t->trial[i].own[0]);
-    orb_free(t->ctx, t->trial[i].own[1]);
+    orb_trial_free(t->ctx, &t->trial[i]);
   }
   for (int s = 0; s < 2; s++) {
     orb_coarse_copy_free(t->ctx, &t->copy[s]);

@@ -57,7 +57,7 @@ void orb_trials_close(orb_trials *trials);
 /* Makes the fine copies, with `size` vertices, once a match is found. */
 ORB_MUST_CHECK orb_status orb_trials_refine(orb_trials *trials, int32_t size);
 
-/* Makes the trials: spectral maps and rotations of the spheres. */
+/* Makes the trials: spectral maps and rotations of the spheres. Lists the surroundings, which they share. */
 ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);
 
 /* Drops the trials whose rough maps take the landmarks far away, registers the others in one direction, drops those
@@ -86,5 +86,8 @@ void orb_trial_fill_cost(const orb_trials *trials, orb_trial *one, int direction
 /* Room for a pose of a mesh; free it in any case. */
 ORB_MUST_CHECK orb_status orb_trial_pose_create(orb_context *ctx, const orb_mesh *mesh, orb_elastic_pose *out);
 void orb_trial_pose_free(orb_context *ctx, orb_elastic_pose *pose);
+
+/* Frees the poses of a trial and its own maps. */
+void orb_trial_free(orb_context *ctx, orb_trial *one);
 
 #endif

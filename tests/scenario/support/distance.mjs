@@ -3,7 +3,7 @@
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/** The distance from p to the triangle a, b, c (Ericson, Real-Time Collision Detection, 5.1.5). */
+/** The distance from p to the triangle a, b, c (Ericson, Real-Time Collision Detection, 5.1.5). Corners may coincide. */
 export function toTriangle(p, a, b, c) {
   const ab = sub(b, a);
   const ac = sub(c, a);
@@ -17,7 +17,7 @@ export function toTriangle(p, a, b, c) {
   const d4 = dot(ac, bp);
   if (d3 >= 0 && d4 <= d3) return at(1, 0);
   const vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(d1 / (d1 - d3), 0);
+  if (vc <= 0 && d1 >= 0 && d3 <= 0 && d1 > d3) return at(d1 / (d1 - d3), 0);
   const cp = sub(p, c);
   const d5 = dot(ab, cp);
   const d6 = dot(ac, cp);
