@@ -262,8 +262,8 @@ static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shap
   return status;
 }
 
-/* Composes two shapes that bend much towards the best of their matches, as their walks show it. If what fits best in
- * space leads to a better map, the match counts as unclear. */
+/* Composes two shapes that bend much towards their match, or towards what leads to a better map where that is poor. If
+ * it is what fits best in space, the match counts as unclear. */
 static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_options *options,
                                orb_alignment *alignment) {
   orb_contest_result won;
@@ -271,7 +271,7 @@ static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_opt
   if (won.is_space) {
     count_as_unclear(m);
   }
-  return won.other > 0 ? choose_other(ctx, m, won.other - 1, NULL, won.clear) : ORB_OK;
+  return won.is_second ? choose_other(ctx, m, 0, NULL, won.clear) : ORB_OK;
 }
 
 /* Computes the targets of all matches. */
