@@ -187,7 +187,8 @@ static int is_one_shape(const orb_trial *one, const orb_match_hint *hint, double
 }
 
 /* Makes trials of small copies, and raises the best of them. Those that bend much are extended before, unless landmarks
- * say which limb is which. */
+ * say which limb is which. Small copies have too few vertices for thin limbs: bodies in poses, which bend little, get
+ * the trials of coarse copies too. */
 static orb_status fill_trials(orb_trials *t) {
   orb_status status = ORB_E_NO_MEMORY;
   orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
@@ -198,11 +199,15 @@ static orb_status fill_trials(orb_trials *t) {
   ORB_GO(status, orb_trials_survey(small, 1), end);
   ORB_GO(status, orb_trials_make(small), end);
   ORB_GO(status, orb_trials_rank(small), end);
+  const int bends_little = orb_trials_bend(small) <= ORB_FIND_COARSE_TOO;
   if (t->hint.count == 0) {
     ORB_GO(status, orb_trials_extend(small), end);
     ORB_GO(status, orb_trials_cross(small), end);
   }
-  status = orb_trials_raise(small, t);
+  ORB_GO(status, orb_trials_raise(small, t), end);
+  if (bends_little) {
+    status = orb_trials_make(t);
+  }
 end:
   orb_trials_close(small);
   orb_free(t->ctx, small);

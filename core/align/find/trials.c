@@ -16,6 +16,8 @@
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
 
+_Static_assert((int)ORB_FIND_RAISED <= (int)ORB_FIND_TIPS, "raised trials and those made of coarse copies have room");
+
 static void scaling_of(const orb_mesh *mesh, orb_trial_scaling *out) {
   orb_extent extent;
   orb_mesh_extent(mesh, &extent);
@@ -240,7 +242,7 @@ orb_status orb_trials_survey(orb_trials *t, int measured) {
 orb_status orb_trials_make(orb_trials *t) {
   ORB_TRY(add_spectral(t));
   ORB_TRY(add_rotations(t));
-  return add_tips(t);
+  return t->survey[0].apart ? add_tips(t) : ORB_OK;
 }
 
 orb_status orb_trial_register(orb_context *ctx, const orb_trials *t, orb_trial *one, int s) {
@@ -311,9 +313,9 @@ int32_t orb_trials_best(const orb_trials *t) {
   return best;
 }
 
-int orb_trials_bend_much(const orb_trials *t) {
+double orb_trials_bend(const orb_trials *t) {
   const orb_trial *best = &t->trial[orb_trials_best(t)];
-  return (best->bend[0] + best->bend[1]) / 2 > ORB_FIND_EXTENDS;
+  return (best->bend[0] + best->bend[1]) / 2;
 }
 
 /* Drops the trials whose pose s takes the landmarks elsewhere. */

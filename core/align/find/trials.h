@@ -14,7 +14,7 @@
 #include "spectral/spectral.h"
 
 enum {
-  ORB_TRIALS_MAX = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS + ORB_FIND_TIPS, /* of small copies */
+  ORB_TRIALS_MAX = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS + ORB_FIND_TIPS,
   ORB_TRIALS_LISTED = 5 /* trials that are listed at most: the best one, and others that differ */
 };
 
@@ -65,7 +65,7 @@ ORB_MUST_CHECK orb_status orb_trials_refine(orb_trials *trials, int32_t size);
 /* Surveys the copies. Call it before trials are made or registered. measured: see orb_survey_create(). */
 ORB_MUST_CHECK orb_status orb_trials_survey(orb_trials *trials, int measured);
 
-/* Makes the trials: spectral maps, rotations of the spheres, and matches of tips. The surveys must be measured. */
+/* Adds trials: spectral maps, rotations of the spheres, and, if the surveys are measured, matches of tips. */
 ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);
 
 /* A trial without a cost, with room for poses and for maps of its own. On failure, free it. */
@@ -80,8 +80,8 @@ ORB_MUST_CHECK orb_status orb_trials_rank(orb_trials *trials);
 /* The number of the trial of least cost. */
 int32_t orb_trials_best(const orb_trials *trials);
 
-/* Does the best trial bend the shapes more than ORB_FIND_EXTENDS? */
-int orb_trials_bend_much(const orb_trials *trials);
+/* How much the best trial bends the shapes: the mean of both directions. */
+double orb_trials_bend(const orb_trials *trials);
 
 /* Lists the best trial and, in order, those that take the first copy elsewhere than it and than each other by more than
  * a share of the diagonal, and that no landmarks contradict. list: room for `most`. Returns how many. */
