@@ -1,11 +1,11 @@
 /* Alignment without landmarks.
  *
  * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
- * (find/match.c), and the composed map goes to the targets of its match. Two shapes that bend much hold a contest of
- * their matches instead (find/contest.h). If the targets give no good map of two shapes, the next best match is tried,
- * and then what fits best in space. If they give none of more shapes, pairs of the matches are pinned as landmarks, and
- * the map is composed with the pairs held and then without them. The alignment of least energy is returned. The preset
- * `fast` only searches for rotations of the given spheres.
+ * (find/match.c), and the composed map goes to the targets of its match. Two shapes that bend much hold a contest
+ * of the ways to make the map instead (find/contest.h). If the targets give no good map of two shapes, the next best
+ * match is tried, and then what fits best in space. If they give none of more shapes, pairs of the matches are pinned
+ * as landmarks, and the map is composed with the pairs held and then without them. The alignment of least energy is
+ * returned. The preset `fast` only searches for rotations of the given spheres.
  */
 #include <math.h>
 #include <string.h>

@@ -376,16 +376,20 @@ test('S3 that sends headers and body apart does not wait for the acknowledgement
   const urls = [];
   for (let i = 0; i < 40; i++)
     urls.push((await d.upload(Buffer.from(`# ${i}${' '.repeat(600)}\n${tetrahedron}`))).json.url);
-  await empty();
+  // Linux delays an acknowledgement by 40 ms at least, and that of the first packets of a connection not at all. On a
+  // busy machine every answer of a round may take as long without that, so there are several rounds.
   const took = [];
-  for (const url of urls) {
-    const began = performance.now();
-    assert.equal((await d.get(`${url}/file`)).status, 200);
-    took.push(performance.now() - began);
+  let fast = false;
+  for (let round = 0; round < 10 && !fast; round++) {
+    await empty();
+    for (let i = 0; i < urls.length; i++) {
+      const began = performance.now();
+      assert.equal((await d.get(`${urls[i]}/file`)).status, 200);
+      took.push(performance.now() - began);
+      fast ||= i >= 20 && took.at(-1) < 35;
+    }
   }
-  // Linux delays an acknowledgement by 40 ms at least, and that of the first packets of a connection not at all.
-  const last = took.slice(20);
-  assert.ok(Math.min(...last) < 35, `${took.map((ms) => ms.toFixed(0))} ms`);
+  assert.ok(fast, `${took.map((ms) => ms.toFixed(0))} ms`);
 });
 
 test('a job that could not read its input runs again, also if S3 is back before it has failed', async (t) => {

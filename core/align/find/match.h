@@ -59,9 +59,8 @@ typedef struct orb_match {
   double clear;  /* 0 to 1: how far the next best map that differs is behind */
   double lead;   /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
                     half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
-  int moves; /* which shape moves in a contest: the second (1), unless the first (0) is clearly less round. Limbs that
-                move stretch to where they go; limbs that stay are left out by the triangles of a round shape, and its
-                energy does not show it */
+  int moves; /* which shape moves where only one does: the second (1), unless the first (0) is clearly less round. Limbs
+                that move stretch to where they go; limbs that stay are left out by the triangles of a round shape */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
