@@ -377,19 +377,21 @@ test('S3 that sends headers and body apart does not wait for the acknowledgement
   for (let i = 0; i < 40; i++)
     urls.push((await d.upload(Buffer.from(`# ${i}${' '.repeat(600)}\n${tetrahedron}`))).json.url);
   // Linux delays an acknowledgement by 40 ms at least, and that of the first packets of a connection not at all. On a
-  // busy machine every answer of a round may take as long without that, so there are several rounds.
+  // busy machine every answer of a round may take as long without that, so there are several rounds. A connection that
+  // opens anew makes one answer fast, so one is not enough.
   const took = [];
-  let fast = false;
-  for (let round = 0; round < 10 && !fast; round++) {
+  let fast = 0;
+  for (let round = 0; round < 10 && fast < 3; round++) {
     await empty();
-    for (let i = 0; i < urls.length; i++) {
+    fast = 0;
+    for (const [i, url] of urls.entries()) {
       const began = performance.now();
-      assert.equal((await d.get(`${urls[i]}/file`)).status, 200);
+      assert.equal((await d.get(`${url}/file`)).status, 200);
       took.push(performance.now() - began);
-      fast ||= i >= 20 && took.at(-1) < 35;
+      fast += i >= 20 && took.at(-1) < 35;
     }
   }
-  assert.ok(fast, `${took.map((ms) => ms.toFixed(0))} ms`);
+  assert.ok(fast >= 3, `${took.map((ms) => ms.toFixed(0))} ms`);
 });
 
 test('a job that could not read its input runs again, also if S3 is back before it has failed', async (t) => {

@@ -86,8 +86,8 @@ static const double ORB_FIND_WALKS_EARLY = 0.14;
  * were closer than this, but for two. */
 static const double ORB_FIND_LESS_ROUND = 0.8;
 /* In a contest, the second match walks only if it costs at most this many times as much as the best one. Of 21 contests
- * of animals, the best match was the right one in 18, and of those beyond 1.4 in all. The
- * factor was chosen on these. */
+ * of animals, the best match was the right one in 18, and of those beyond 1.4 in all. The factor
+ * was chosen on these. */
 static const double ORB_FIND_CONTEST_BEHIND = 1.5;
 /* The map of a match that bends more replaces that of the other one if it exceeds 1 by less than this share of what the
  * other does: maps of one match differ by as much. */
