@@ -1,11 +1,11 @@
 /* Alignment without landmarks.
  *
  * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
- * (find/match.c), and the composed map goes to the targets of its match. Two shapes that bend much hold a contest of
- * their matches instead (find/contest.h). If the targets give no good map of two shapes, the next best match is tried,
- * and then what fits best in space. If they give none of more shapes, pairs of the matches are pinned as landmarks, and
- * the map is composed with the pairs held and then without them. The alignment of least energy is returned. The preset
- * `fast` only searches for rotations of the given spheres.
+ * (find/match.c), and the composed map goes to the targets of its match. Two shapes that bend much hold a contest
+ * of the ways to make the map instead (find/contest.h). If the targets give no good map of two shapes, the next best
+ * match is tried, and then what fits best in space. If they give none of more shapes, pairs of the matches are pinned
+ * as landmarks, and the map is composed with the pairs held and then without them. The alignment of least energy is
+ * returned. The preset `fast` only searches for rotations of the given spheres.
  */
 #include <math.h>
 #include <string.h>
@@ -262,8 +262,8 @@ static orb_status compete_in_space(orb_context *ctx, const orb_align_shape *shap
   return status;
 }
 
-/* Composes two shapes that bend much towards the best of their matches, as their walks show it. If what fits best in
- * space leads to a better map, the match counts as unclear. */
+/* Composes two shapes that bend much towards their match, or towards what leads to a better map where that is poor. If
+ * it is what fits best in space, the match counts as unclear. */
 static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_options *options,
                                orb_alignment *alignment) {
   orb_contest_result won;
@@ -271,7 +271,7 @@ static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_opt
   if (won.is_space) {
     count_as_unclear(m);
   }
-  return won.other > 0 ? choose_other(ctx, m, won.other - 1, NULL, won.clear) : ORB_OK;
+  return won.is_second ? choose_other(ctx, m, 0, NULL, won.clear) : ORB_OK;
 }
 
 /* Computes the targets of all matches. */

@@ -57,12 +57,19 @@ static void scene_close(scene *s) {
 
 static orb_status extend(scene *s, int *extended) {
   const double *const position[2] = {s->position[0], s->position[1]};
-  orb_agreed agreed;
-  orb_status status = orb_agreed_create(ctx, &s->mesh, &s->mesh, &agreed);
+  const orb_mesh *const mesh[2] = {&s->mesh, &s->mesh};
+  orb_agreed agreed = {0};
+  orb_survey survey;
+  orb_status status = orb_survey_create(ctx, &s->mesh, 1, &survey);
+  const orb_survey *const surveys[2] = {&survey, &survey};
+  if (status == ORB_OK) {
+    status = orb_agreed_create(ctx, mesh, surveys, &agreed);
+  }
   if (status == ORB_OK) {
     status = orb_agreed_extend(ctx, &agreed, position, 1, s->forth, s->back, extended);
   }
   orb_agreed_free(ctx, &agreed);
+  orb_survey_free(ctx, &survey);
   return status;
 }
 

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "align/find/params.h"
-#include "align/map/engine/surface.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
@@ -14,46 +13,35 @@ enum {
   TURNS = 30       /* of the power iteration: weights need two digits */
 };
 
-orb_status orb_agreed_create(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, orb_agreed *out) {
-  const int32_t n = first->vertex_count, m = second->vertex_count, most = n > m ? n : m;
-  memset(out, 0, sizeof *out);
-  out->mesh[0] = first;
-  out->mesh[1] = second;
+orb_status orb_agreed_create(orb_context *ctx, const orb_mesh *const mesh[2], const orb_survey *const survey[2],
+                             orb_agreed *out) {
+  const int32_t n = mesh[0]->vertex_count, m = mesh[1]->vertex_count;
+  *out = (orb_agreed){.mesh = {mesh[0], mesh[1]}, .survey = {survey[0], survey[1]}};
   for (int s = 0; s < 2; s++) {
-    const orb_mesh *mesh = out->mesh[s];
-    ORB_TRY(orb_nearest_create(ctx, mesh->positions, mesh->triangles, mesh->triangle_count, &out->tree[s]));
-    ORB_TRY(orb_distances_create(ctx, mesh, &out->distances[s]));
-    out->from[s] = ORB_NEW(ctx, float, ORB_AGREED_MARKS *(size_t)mesh->vertex_count);
-    out->image[s] = ORB_NEW(ctx, int32_t, mesh->vertex_count);
-    if (!out->from[s] || !out->image[s]) {
-      return ORB_E_NO_MEMORY;
-    }
+    out->image[s] = ORB_NEW(ctx, int32_t, mesh[s]->vertex_count);
   }
-  out->one = ORB_NEW(ctx, double, most);
   out->far = ORB_NEW(ctx, double, n);
-  out->sum = ORB_NEW(ctx, float, most);
-  return out->one && out->far && out->sum ? ORB_OK : ORB_E_NO_MEMORY;
+  out->sum = ORB_NEW(ctx, float, n > m ? n : m);
+  return out->image[0] && out->image[1] && out->far && out->sum ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
 void orb_agreed_free(orb_context *ctx, orb_agreed *a) {
-  for (int s = 0; s < 2; s++) {
-    orb_nearest_destroy(ctx, a->tree[s]);
-    orb_distances_free(ctx, &a->distances[s]);
-    orb_free(ctx, a->from[s]);
-    orb_free(ctx, a->image[s]);
-  }
-  orb_free(ctx, a->one);
+  orb_free(ctx, a->image[0]);
+  orb_free(ctx, a->image[1]);
   orb_free(ctx, a->far);
   orb_free(ctx, a->sum);
   memset(a, 0, sizeof *a);
 }
 
+/* Distances of all vertices of mesh s from mark k. */
+static const float *from_mark(const orb_agreed *a, int s, int32_t k) {
+  return a->survey[s]->apart + (size_t)a->mark[s][k] * (size_t)a->mesh[s]->vertex_count;
+}
+
 static void fill_images(orb_agreed *a, const double *const position[2]) {
   for (int s = 0; s < 2; s++) {
     for (int32_t v = 0; v < a->mesh[s]->vertex_count; v++) {
-      orb_place place;
-      (void)orb_nearest_query(a->tree[1 - s], position[s] + 3 * (size_t)v, INFINITY, &place);
-      a->image[s][v] = orb_map_nearest_corner(a->mesh[1 - s]->triangles, &place);
+      a->image[s][v] = orb_survey_nearest(a->survey[1 - s], a->mesh[1 - s], position[s] + 3 * (size_t)v);
     }
   }
 }
@@ -80,18 +68,11 @@ static int32_t flag_agreed(orb_agreed *a, int32_t *agreed) {
 
 /* Adds a vertex and its image as marks. `far` becomes less where the vertex is near. */
 static void add_mark(orb_agreed *a, int32_t v) {
-  for (int s = 1; s >= 0; s--) {
-    const int32_t n = a->mesh[s]->vertex_count, mark = s ? a->image[0][v] : v;
-    float *row = a->from[s] + (size_t)a->count * (size_t)n;
-    orb_distances_from(&a->distances[s], mark, a->one);
-    for (int32_t k = 0; k < n; k++) {
-      row[k] = (float)a->one[k];
-    }
-    a->mark[s][a->count] = mark;
-  }
-  a->count++;
+  a->mark[0][a->count] = v;
+  a->mark[1][a->count] = a->image[0][v];
+  const float *row = from_mark(a, 0, a->count++);
   for (int32_t k = 0; k < a->mesh[0]->vertex_count; k++) {
-    a->far[k] = fmin(a->far[k], a->one[k]);
+    a->far[k] = fmin(a->far[k], (double)row[k]);
   }
 }
 
@@ -108,8 +89,7 @@ static void spread_marks(orb_agreed *a, int32_t next) {
 
 /* How alike the distances between two marks are on the two meshes: 1 at most. */
 static double likeness(const orb_agreed *a, int32_t i, int32_t k) {
-  const double x = a->from[0][(size_t)i * (size_t)a->mesh[0]->vertex_count + (size_t)a->mark[0][k]];
-  const double y = a->from[1][(size_t)i * (size_t)a->mesh[1]->vertex_count + (size_t)a->mark[1][k]];
+  const double x = from_mark(a, 0, i)[a->mark[0][k]], y = from_mark(a, 1, i)[a->mark[1][k]];
   const double off = log((x + ORB_FIND_AGREED_EDGE) / (y + ORB_FIND_AGREED_EDGE)) / ORB_FIND_AGREED_STRETCH;
   return exp(-off * off / 2);
 }
@@ -144,7 +124,7 @@ static void weigh_marks(orb_agreed *a) {
 static void keep_inner(orb_agreed *a, double share) {
   double apart[ORB_AGREED_MARKS], rising[ORB_AGREED_MARKS];
   for (int32_t i = 0; i < a->count; i++) {
-    const float *row = a->from[0] + (size_t)i * (size_t)a->mesh[0]->vertex_count;
+    const float *row = from_mark(a, 0, i);
     int32_t at = i;
     apart[i] = 0;
     for (int32_t k = 0; k < a->count; k++) {
@@ -164,13 +144,13 @@ static void keep_inner(orb_agreed *a, double share) {
 /* The vertex of the other mesh whose distances from the marks are most like those of vertex v of mesh s. Near marks
  * weigh more. */
 static int32_t most_alike(orb_agreed *a, int s, int32_t v) {
-  const int32_t n = a->mesh[s]->vertex_count, m = a->mesh[1 - s]->vertex_count;
+  const int32_t m = a->mesh[1 - s]->vertex_count;
   float *restrict sum = a->sum;
   memset(sum, 0, (size_t)m * sizeof *sum);
   for (int32_t k = 0; k < a->count; k++) {
-    const float distance = a->from[s][(size_t)k * (size_t)n + (size_t)v], near = ORB_FIND_AGREED_NEAR + distance;
+    const float distance = from_mark(a, s, k)[v], near = ORB_FIND_AGREED_NEAR + distance;
     const float weight = (float)a->weight[k] / (near * near);
-    const float *restrict row = a->from[1 - s] + (size_t)k * (size_t)m;
+    const float *restrict row = from_mark(a, 1 - s, k);
     for (int32_t u = 0; u < m; u++) {
       const float d = distance - row[u];
       sum[u] += weight * d * d;

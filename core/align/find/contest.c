@@ -9,8 +9,9 @@
 #include "base/memory.h"
 #include "base/tasks.h"
 
-/* Contestants: the three best matches, as orb_match_target() numbers them, and what fits best in space. */
-enum { BEST, SECOND, THIRD, SPACE, MOST };
+/* Contestants: the match with the shape moving that it names, the same with the other one, the next best match, and
+ * what fits best in space. */
+enum { MATCH, TURNED, SECOND, SPACE, MOST };
 
 typedef struct contest {
   const orb_match *match;
@@ -20,28 +21,31 @@ typedef struct contest {
   orb_map_draft *draft[MOST];
   double energy[MOST];        /* of walks, then of finished maps; INFINITY: not walked, or none leads to a map */
   double known;               /* energy of the best walk of an earlier round, or INFINITY */
-  double walked[MOST];        /* energy of walks */
+  double walked;              /* energy of the best walk of the match */
   int32_t round[MOST], count; /* those that walk, and later those that are finished, side by side */
 } contest;
 
 int orb_contest_is_open(const orb_match *match, int keep_angles) {
-  return keep_angles && match->is_found && match->bend > ORB_FIND_WALKS_FIRST && match->other_count > 0 &&
-         match->other[0].cost <= ORB_FIND_OTHER_BEHIND;
+  return keep_angles && match->is_found && match->bend > ORB_FIND_WALKS_FIRST;
 }
 
-/* Which shape moves: that of the match, unless it is too large. */
-static int moving_of(const contest *c) {
-  const int32_t large = orb_map_params_of(c->preset).copies.large;
-  return c->match->moves == 0 && c->alignment->shapes[0].mesh.vertex_count <= large ? 0 : 1;
+/* Is the first shape small enough to move? */
+static int first_may_move(const contest *c) {
+  return c->alignment->shapes[0].mesh.vertex_count <= orb_map_params_of(c->preset).copies.large;
+}
+
+static int moving_of(const contest *c, int32_t n) {
+  const int moving = c->match->moves == 0 && first_may_move(c) ? 0 : 1;
+  return n == TURNED ? 1 - moving : moving;
 }
 
 static orb_status walk(orb_context *ctx, void *arg, int32_t i) {
   contest *c = arg;
   const int32_t n = c->round[i];
-  const int moving = moving_of(c);
+  const int moving = moving_of(c, n);
   orb_aligned_shape *shapes = c->alignment->shapes;
   if (n != SPACE) {
-    ORB_TRY(orb_match_target(ctx, c->match, n, moving, &c->target[n]));
+    ORB_TRY(orb_match_target(ctx, c->match, n == SECOND, moving, &c->target[n]));
     if (!c->target[n]) {
       return ORB_OK;
     }
@@ -50,55 +54,31 @@ static orb_status walk(orb_context *ctx, void *arg, int32_t i) {
                               &c->draft[n], &c->energy[n]);
 }
 
-/* By how much the energy exceeds 1, times the cost of the match relative to the best one. */
-static double score(const contest *c, int32_t n) {
-  const double cost = n == SECOND || n == THIRD ? c->match->other[n - SECOND].cost : 1;
-  return c->energy[n] < INFINITY ? (c->energy[n] - 1) * cost : INFINITY;
-}
-
-/* The contestant of least score but for `omit`, or −1. */
+/* The contestant of least energy but for `omit`, or −1. */
 static int32_t least_of(const contest *c, int32_t omit) {
   int32_t least = -1;
   for (int32_t n = 0; n < MOST; n++) {
-    if (n != omit && score(c, n) < (least < 0 ? INFINITY : score(c, least))) {
+    if (n != omit && c->energy[n] < (least < 0 ? INFINITY : c->energy[least])) {
       least = n;
     }
   }
   return least;
 }
 
-static void drop(orb_context *ctx, contest *c, int32_t n) {
-  orb_map_draft_free(ctx, c->draft[n]);
-  c->draft[n] = NULL;
-}
-
-/* Frees the worse of the first two drafts, unless it is close: each holds a copy of the surfaces. */
-static void drop_worse(orb_context *ctx, contest *c) {
-  const int32_t worse = score(c, SECOND) < score(c, BEST) ? BEST : SECOND;
-  if (score(c, worse) > ORB_FIND_CONTEST_CLOSE * score(c, SECOND - worse)) {
-    drop(ctx, c, worse);
-    c->walked[worse] = c->energy[worse];
-    c->energy[worse] = INFINITY;
-  }
-}
-
-/* The best match walks first, and the second one beside it if it costs little more. If these walks are poor, the third
- * match and what fits best in space walk too. */
+/* The match walks both ways side by side. If both walks are poor, the next best match and what fits best in space walk
+ * too. */
 static orb_status walk_all(orb_context *ctx, contest *c) {
-  c->count = c->match->other[0].cost <= ORB_FIND_CONTEST_BEHIND ? 2 : 1;
-  c->round[0] = BEST;
-  c->round[1] = SECOND;
+  c->round[0] = MATCH;
+  c->round[1] = TURNED;
+  c->count = first_may_move(c) ? 2 : 1;
   ORB_TRY(orb_tasks_run(ctx, c->count, walk, c));
-  c->known = fmin(c->energy[BEST], c->energy[SECOND]);
+  c->known = c->walked = fmin(c->energy[MATCH], c->energy[TURNED]);
   if (c->known <= ORB_FIND_CONTEST_POOR) {
     return ORB_OK;
   }
-  drop_worse(ctx, c);
-  c->count = 0;
-  if (c->match->other_count > 1) {
-    c->round[c->count++] = THIRD;
-  }
-  c->round[c->count++] = SPACE;
+  c->round[0] = SPACE;
+  c->round[1] = SECOND;
+  c->count = c->match->other_count > 0 ? 2 : 1;
   return orb_tasks_run(ctx, c->count, walk, c);
 }
 
@@ -112,35 +92,31 @@ static orb_status finish(orb_context *ctx, void *arg, int32_t i) {
 static orb_status finish_best(orb_context *ctx, contest *c) {
   const int32_t best = least_of(c, -1), next = least_of(c, best);
   c->count = 1;
-  c->round[0] = best < 0 ? BEST : best;
-  if (next >= 0 && score(c, next) <= ORB_FIND_CONTEST_CLOSE * score(c, best)) {
+  c->round[0] = best < 0 ? MATCH : best;
+  if (next >= 0 && c->energy[next] - 1 <= ORB_FIND_CONTEST_CLOSE * (c->energy[best] - 1)) {
     c->round[c->count++] = next;
   }
   for (int32_t n = 0; n < MOST; n++) {
     if (n != c->round[0] && (c->count < 2 || n != c->round[1])) {
-      drop(ctx, c, n);
+      orb_map_draft_free(ctx, c->draft[n]);
+      c->draft[n] = NULL;
     }
   }
   return orb_tasks_run(ctx, c->count, finish, c);
 }
 
-/* How clearly a winner beats the best match: by finished maps if both are finished, otherwise by walks. */
-static double clear_of(const contest *c, int32_t winner) {
-  const double *energy = c->draft[BEST] ? c->energy : c->walked;
-  const double least = fmin(energy[BEST], orb_map_params_of(c->preset).energy.poor);
-  return winner == BEST ? 0 : fmax(0, 1 - energy[winner] / least);
-}
-
-/* Takes the better map. Of two that are as good, that of the match that bends the shapes less wins. */
+/* Takes the better map. Of two that are as good, the first of the contestants wins. */
 static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *out) {
   const int32_t first = c->count == 2 && c->round[1] < c->round[0], second = c->count - 1 - first;
   int32_t winner = c->round[first];
-  if (score(c, c->round[second]) < ORB_FIND_CONTEST_GAIN * score(c, winner)) {
+  if (c->energy[c->round[second]] - 1 < ORB_FIND_CONTEST_GAIN * (c->energy[winner] - 1)) {
     winner = c->round[second];
   }
   out->is_space = winner == SPACE;
-  out->other = winner == SPACE ? 0 : winner;
-  out->clear = clear_of(c, winner);
+  out->is_second = winner == SECOND;
+  if (winner == SECOND) {
+    out->clear = fmax(0, 1 - c->energy[SECOND] / fmin(c->walked, orb_map_params_of(c->preset).energy.poor));
+  }
   return orb_map_draft_take(ctx, c->draft[winner], &c->alignment->energy);
 }
 
@@ -150,12 +126,9 @@ orb_status orb_contest_run(orb_context *ctx, const orb_match *match, orb_preset 
   orb_status status;
   *out = (orb_contest_result){0};
   for (int32_t n = 0; n < MOST; n++) {
-    c.energy[n] = c.walked[n] = INFINITY;
+    c.energy[n] = INFINITY;
   }
   ORB_GO(status, walk_all(ctx, &c), end);
-  for (int32_t n = 0; n < MOST; n++) {
-    c.walked[n] = c.draft[n] ? c.energy[n] : c.walked[n];
-  }
   ORB_GO(status, finish_best(ctx, &c), end);
   status = take_winner(ctx, &c, out);
 end:

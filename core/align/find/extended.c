@@ -11,24 +11,16 @@
 /* Trials that are extended side by side. */
 typedef struct chains {
   orb_trials *t;
-  int32_t trial[ORB_FIND_EXTENDED], count;
   double most; /* cost of a trial that is extended again */
 } chains;
 
-/* Copies the positions of a trial. `out` has its own maps, still to be filled, and no cost. */
+/* Copies the positions of a trial. `out` has maps of its own, still to be filled, and no cost. */
 static orb_status copy_trial(orb_context *ctx, const orb_trials *t, const orb_trial *one, orb_trial *out) {
-  *out = (orb_trial){.cost = INFINITY, .rough = INFINITY};
+  ORB_TRY(orb_trial_create(ctx, t, out));
   for (int s = 0; s < 2; s++) {
     const size_t n = (size_t)t->copy[s].mesh.vertex_count;
-    ORB_TRY(orb_trial_pose_create(ctx, &t->copy[s].mesh, &out->pose[s]));
     memcpy(out->pose[s].position, one->pose[s].position, 3 * n * sizeof(double));
-    out->own[s] = ORB_NEW(ctx, int32_t, n);
-    if (!out->own[s]) {
-      return ORB_E_NO_MEMORY;
-    }
   }
-  out->map[0] = (orb_rough_map){out->own[0], out->own[1]};
-  out->map[1] = (orb_rough_map){out->own[1], out->own[0]};
   return ORB_OK;
 }
 
@@ -53,11 +45,16 @@ static orb_status extend(orb_context *ctx, const orb_trials *t, orb_agreed *agre
 static orb_status run_chain(orb_context *ctx, void *arg, int32_t i) {
   const chains *all = arg;
   orb_trials *t = all->t;
-  orb_trial *best = &t->trial[all->trial[i]], next = {0}, last = {0};
+  orb_trial *best = &t->trial[i], next = {0}, last = {0};
+  const orb_mesh *const mesh[2] = {&t->copy[0].mesh, &t->copy[1].mesh};
+  const orb_survey *const survey[2] = {&t->survey[0], &t->survey[1]};
   orb_agreed agreed = {0};
   orb_status status;
   int extended = 1;
-  ORB_GO(status, orb_agreed_create(ctx, &t->copy[0].mesh, &t->copy[1].mesh, &agreed), end);
+  if (!(best->cost < INFINITY)) {
+    return ORB_OK; /* it was dropped */
+  }
+  ORB_GO(status, orb_agreed_create(ctx, mesh, survey, &agreed), end);
   ORB_GO(status, copy_trial(ctx, t, best, &next), end);
   for (int round = 0; round < ORB_FIND_EXTENSIONS; round++) {
     ORB_GO(status, extend(ctx, t, &agreed, &next, round == 0 ? ORB_FIND_AGREED_INNER : 1, &extended), end);
@@ -83,37 +80,12 @@ end:
   return status;
 }
 
-static int is_listed(const chains *all, int32_t i) {
-  int listed = 0;
-  for (int32_t k = 0; k < all->count; k++) {
-    listed |= all->trial[k] == i;
-  }
-  return listed;
-}
-
-/* Lists the trials of least cost, the best first. */
-static void list_best(chains *all) {
-  const orb_trial *trial = all->t->trial;
-  for (int32_t next = 0; next >= 0 && all->count < ORB_FIND_EXTENDED;) {
-    next = -1;
-    for (int32_t i = 0; i < all->t->count; i++) {
-      if (!is_listed(all, i) && trial[i].cost < (next < 0 ? INFINITY : trial[next].cost)) {
-        next = i;
-      }
-    }
-    if (next >= 0) {
-      all->trial[all->count++] = next;
-    }
-  }
-}
-
 orb_status orb_trials_extend(orb_trials *t) {
   const orb_trial *best = &t->trial[orb_trials_best(t)];
   chains all = {.t = t};
-  if (!((best->bend[0] + best->bend[1]) / 2 > ORB_FIND_EXTENDS)) {
+  if (!(orb_trials_bend(t) > ORB_FIND_EXTENDS)) {
     return ORB_OK;
   }
   all.most = ORB_FIND_EXTENDS_BEHIND * best->cost;
-  list_best(&all);
-  return orb_tasks_run(t->ctx, all.count, run_chain, &all);
+  return orb_tasks_run(t->ctx, t->count, run_chain, &all);
 }

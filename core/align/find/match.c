@@ -3,8 +3,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/crossed.h"
 #include "align/find/extended.h"
 #include "align/find/params.h"
+#include "align/find/raised.h"
 #include "align/find/trials.h"
 #include "align/map/engine/spread.h"
 #include "align/map/engine/surface.h"
@@ -90,7 +92,8 @@ static orb_status draw_to_landmarks(orb_context *ctx, const orb_trials *t, orb_t
   ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, copy, &anchors), end);
   ORB_GO(status, orb_trial_pose_create(ctx, copy, &drawn), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};
-  ORB_GO(status, orb_elastic_register(ctx, copy, &t->copy[0].mesh, &t->around[1], &one->map[1], &held, &drawn, &bend),
+  ORB_GO(status,
+         orb_elastic_register(ctx, copy, &t->copy[0].mesh, &t->survey[1].around, &one->map[1], &held, &drawn, &bend),
          end);
   if (bend <= ORB_FIND_DRAWN_BEND * one->bend[1]) {
     const orb_elastic_pose before = one->pose[1];
@@ -183,6 +186,34 @@ static int is_one_shape(const orb_trial *one, const orb_match_hint *hint, double
   return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
 }
 
+/* Makes trials of small copies, and raises the best of them. Those that bend much are extended before, unless landmarks
+ * say which limb is which. Small copies have too few vertices for thin limbs: bodies in poses, which bend little, get
+ * the trials of coarse copies too. */
+static orb_status fill_trials(orb_trials *t) {
+  orb_status status = ORB_E_NO_MEMORY;
+  orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
+  if (!small) {
+    return status;
+  }
+  ORB_GO(status, orb_trials_open_small(t, small), end);
+  ORB_GO(status, orb_trials_survey(small, 1), end);
+  ORB_GO(status, orb_trials_make(small), end);
+  ORB_GO(status, orb_trials_rank(small), end);
+  const int bends_little = orb_trials_bend(small) <= ORB_FIND_COARSE_TOO;
+  if (t->hint.count == 0) {
+    ORB_GO(status, orb_trials_extend(small), end);
+    ORB_GO(status, orb_trials_cross(small), end);
+  }
+  ORB_GO(status, orb_trials_raise(small, t), end);
+  if (bends_little) {
+    status = orb_trials_make(t);
+  }
+end:
+  orb_trials_close(small);
+  orb_free(t->ctx, small);
+  return status;
+}
+
 static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
                       int walks, orb_match *out) {
   orb_trials *t = out->trials;
@@ -194,7 +225,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   if (hint && !(stretch <= hint->stretch)) {
     return ORB_OK;
   }
-  ORB_TRY(orb_trials_make(t));
+  ORB_TRY(fill_trials(t));
   ORB_TRY(orb_trials_rank(t));
   int32_t best = orb_trials_best(t);
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
@@ -205,7 +236,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     return ORB_OK;
   }
   if (!hint) {
-    ORB_TRY(orb_trials_extend(t));
+    ORB_TRY(orb_trials_cross(t));
   }
   out->is_found = 1;
   out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;

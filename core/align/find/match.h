@@ -4,22 +4,26 @@
  * In: two meshes. Out: where each vertex of the second lies on the first. Read in this order:
  *
  *   hint.h    what landmarks say of a match
+ *   survey.h  what trials share of a copy
+ *   tips.h    tips of limbs, and rotations of the spheres under which they meet
  *   trials.h  rough maps, registered and ranked
  *   agreed.h, extended.h
  *             rough maps that follow from the part on which a trial agrees with its way back
+ *   crossed.h registrations along the way back of the other direction
+ *   raised.h  the best trials, on finer copies
  *   match.h   the best of them, its pairs and its targets
  *   found.h   the landmarks that an alignment found, and their confidence
- *   contest.h which of the best matches leads to the better map
+ *   contest.h which way leads to the better map
  *   params.h  all thresholds
  *
  * Decimated copies of both shapes are registered to each other along each rough map, in both directions
  * (elastic/elastic.h). The maps come from the eigenfunctions (spectral/spectral.h), which hardly depend on the pose,
- * and from rotations of the spheres (align/rotate/correlate.h), which hardly depend on proportions. A map of the right
- * limbs bends the copies least, even if it is off at their tips. A twin (left and right swapped with front and back)
- * bends them more, and often also rotates them in space.
+ * and from rotations of the spheres, by positions and normals (align/rotate/correlate.h) or by tips, which hardly
+ * depend on proportions. A map of the right limbs bends the copies least, even if it is off at their tips. A twin (left
+ * and right swapped with front and back) bends them more, and often also rotates them in space.
  *
- * Where shapes bend much, the best maps are extended (extended.h), and the walks towards the two best matches decide if
- * their costs are near (contest.h).
+ * All maps are tried on small copies, where a registration takes 3 ms; where shapes bend much, all are extended and
+ * crossed there. The best few are registered again on copies three times as fine, and ranked.
  *
  * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on
  * the course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by
@@ -55,9 +59,8 @@ typedef struct orb_match {
   double clear;  /* 0 to 1: how far the next best map that differs is behind */
   double lead;   /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
                     half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
-  int moves; /* which shape moves in a contest: the second (1), unless the first (0) is clearly less round. Limbs that
-                move stretch to where they go; limbs that stay are left out by the triangles of a round shape, and its
-                energy does not show it */
+  int moves; /* which shape moves where only one does: the second (1), unless the first (0) is clearly less round. Limbs
+                that move stretch to where they go; limbs that stay are left out by the triangles of a round shape */
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */

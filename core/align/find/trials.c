@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/tips.h"
 #include "align/map/engine/surface.h"
 #include "align/rotate/correlate.h"
 #include "align/rotate/procrustes.h"
@@ -14,6 +15,8 @@
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
+
+_Static_assert((int)ORB_FIND_RAISED <= (int)ORB_FIND_TIPS, "raised trials and those made of coarse copies have room");
 
 static void scaling_of(const orb_mesh *mesh, orb_trial_scaling *out) {
   orb_extent extent;
@@ -46,6 +49,34 @@ orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_me
   return orb_tasks_run(ctx, 2, make_coarse, t);
 }
 
+static orb_status make_small(orb_context *ctx, void *arg, int32_t s) {
+  orb_trials *t = arg;
+  t->scaling[s] = (orb_trial_scaling){.scale = 1}; /* a coarse copy is scaled already */
+  return make_copy(ctx, t, s, ORB_FIND_SMALL, &t->copy[s]);
+}
+
+/* The landmarks of the coarse copies, on the small ones. */
+static orb_status copy_hint(const orb_trials *coarse, orb_trials *small) {
+  const orb_hint_places *from = &coarse->hint;
+  const size_t count = 3 * (size_t)from->count;
+  double *at[2];
+  for (int s = 0; s < 2; s++) {
+    at[s] = ORB_NEW(small->ctx, double, count);
+    if (at[s]) {
+      memcpy(at[s], from->at[s], count * sizeof(double));
+    }
+  }
+  return orb_hint_places_create(small->ctx, from->count, from->few, at, small->copy, &small->hint);
+}
+
+orb_status orb_trials_open_small(const orb_trials *coarse, orb_trials *small) {
+  small->ctx = coarse->ctx;
+  small->mesh[0] = &coarse->copy[0].mesh;
+  small->mesh[1] = &coarse->copy[1].mesh;
+  ORB_TRY(orb_tasks_run(small->ctx, 2, make_small, small));
+  return coarse->hint.count > 0 ? copy_hint(coarse, small) : ORB_OK;
+}
+
 static orb_status make_fine(orb_context *ctx, void *arg, int32_t s) {
   orb_trials *t = arg;
   return make_copy(ctx, t, s, t->fine_size, &t->fine[s]);
@@ -73,6 +104,21 @@ void orb_trial_free(orb_context *ctx, orb_trial *one) {
     orb_trial_pose_free(ctx, &one->pose[s]);
     orb_free(ctx, one->own[s]);
   }
+}
+
+orb_status orb_trial_create(orb_context *ctx, const orb_trials *t, orb_trial *out) {
+  *out = (orb_trial){.cost = INFINITY, .rough = INFINITY};
+  for (int s = 0; s < 2; s++) {
+    const orb_mesh *mesh = &t->copy[s].mesh;
+    ORB_TRY(orb_trial_pose_create(ctx, mesh, &out->pose[s]));
+    out->own[s] = ORB_NEW(ctx, int32_t, mesh->vertex_count);
+    if (!out->own[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+  }
+  out->map[0] = (orb_rough_map){out->own[0], out->own[1]};
+  out->map[1] = (orb_rough_map){out->own[1], out->own[0]};
+  return ORB_OK;
 }
 
 /* Poses of a trial, both of its maps in both directions. */
@@ -144,19 +190,63 @@ static orb_status add_rotations(orb_trials *t) {
   return ORB_OK;
 }
 
-static orb_status list_surroundings(orb_context *ctx, void *arg, int32_t s) {
-  orb_trials *t = arg;
-  return orb_surroundings_create(ctx, &t->copy[s].mesh, &t->around[s]);
+/* Fills a map by the vertices of the other sphere that are nearest to where a match of tips takes those of copy s. */
+static void carried_map(const orb_trials *t, const orb_tips *const tips[2], const orb_tip_match *match, int s,
+                        int32_t *out) {
+  const orb_coarse_copy *from = &t->copy[s], *to = &t->copy[1 - s];
+  for (int32_t v = 0; v < from->mesh.vertex_count; v++) {
+    double p[3], best = -INFINITY;
+    orb_tip_match_carry(tips, match, s, from->points + 3 * (size_t)v, p);
+    for (int32_t u = 0; u < to->mesh.vertex_count; u++) {
+      const double near = orb_dot(p, to->points + 3 * (size_t)u);
+      out[v] = near > best ? u : out[v];
+      best = near > best ? near : best;
+    }
+  }
+}
+
+static orb_status add_tips(orb_trials *t) {
+  orb_tips tips[2];
+  orb_tip_match match[ORB_FIND_TIPS];
+  const orb_tips *const both[2] = {&tips[0], &tips[1]};
+  for (int s = 0; s < 2; s++) {
+    ORB_TRY(orb_tips_find(t->ctx, &t->copy[s], &t->survey[s], &tips[s]));
+  }
+  const int32_t count = orb_tips_match(&tips[0], &tips[1], ORB_FIND_TIPS, match);
+  for (int32_t i = 0; i < count; i++) {
+    orb_trial *one = &t->trial[t->count++];
+    ORB_TRY(orb_trial_create(t->ctx, t, one));
+    one->cost = one->rough = 0;
+    for (int s = 0; s < 2; s++) {
+      carried_map(t, both, &match[i], s, one->own[s]);
+    }
+  }
+  return orb_context_check(t->ctx);
+}
+
+typedef struct surveying {
+  orb_trials *t;
+  int measured;
+} surveying;
+
+static orb_status survey(orb_context *ctx, void *arg, int32_t s) {
+  const surveying *all = arg;
+  return orb_survey_create(ctx, &all->t->copy[s].mesh, all->measured, &all->t->survey[s]);
+}
+
+orb_status orb_trials_survey(orb_trials *t, int measured) {
+  surveying all = {t, measured};
+  return orb_tasks_run(t->ctx, 2, survey, &all);
 }
 
 orb_status orb_trials_make(orb_trials *t) {
-  ORB_TRY(orb_tasks_run(t->ctx, 2, list_surroundings, t));
   ORB_TRY(add_spectral(t));
-  return add_rotations(t);
+  ORB_TRY(add_rotations(t));
+  return t->survey[0].apart ? add_tips(t) : ORB_OK;
 }
 
 orb_status orb_trial_register(orb_context *ctx, const orb_trials *t, orb_trial *one, int s) {
-  return orb_elastic_register(ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &t->around[s], &one->map[s], NULL,
+  return orb_elastic_register(ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &t->survey[s].around, &one->map[s], NULL,
                               &one->pose[s], &one->bend[s]);
 }
 
@@ -221,6 +311,11 @@ int32_t orb_trials_best(const orb_trials *t) {
     best = t->trial[i].cost < t->trial[best].cost ? i : best;
   }
   return best;
+}
+
+double orb_trials_bend(const orb_trials *t) {
+  const orb_trial *best = &t->trial[orb_trials_best(t)];
+  return (best->bend[0] + best->bend[1]) / 2;
 }
 
 /* Drops the trials whose pose s takes the landmarks elsewhere. */
@@ -312,9 +407,9 @@ static double difference(const orb_trials *t, const orb_trial *x, const orb_tria
 }
 
 /* Whether a trial takes the first copy elsewhere than all trials of the list. */
-static int is_different(const orb_trials *t, const orb_trial *one, const int32_t *list, int32_t count) {
+static int is_different(const orb_trials *t, const orb_trial *one, double apart, const int32_t *list, int32_t count) {
   for (int32_t i = 0; i < count; i++) {
-    if (!(difference(t, one, &t->trial[list[i]]) > ORB_FIND_DIFFERENT)) {
+    if (!(difference(t, one, &t->trial[list[i]]) > apart)) {
       return 0;
     }
   }
@@ -326,22 +421,23 @@ static int is_before(const orb_trial *x, const orb_trial *y) {
   return x->cost < INFINITY || y->cost < INFINITY ? x->cost < y->cost : x->rough < y->rough;
 }
 
-void orb_trials_list(orb_trials *t) {
-  t->list[0] = orb_trials_best(t);
-  t->listed = 1;
-  while (t->listed < ORB_TRIALS_LISTED) {
-    int32_t next = -1;
-    for (int32_t i = 0; i < t->count; i++) {
+int32_t orb_trials_differing(const orb_trials *t, double apart, int32_t most, int32_t *list) {
+  int32_t count = 0, next = orb_trials_best(t);
+  while (next >= 0 && count < most) {
+    list[count++] = next;
+    next = -1;
+    for (int32_t i = 0; i < t->count && count < most; i++) {
       if (t->trial[i].rough < INFINITY && (next < 0 || is_before(&t->trial[i], &t->trial[next])) &&
-          is_different(t, &t->trial[i], t->list, t->listed)) {
+          is_different(t, &t->trial[i], apart, list, count)) {
         next = i;
       }
     }
-    if (next < 0) {
-      break;
-    }
-    t->list[t->listed++] = next;
   }
+  return count;
+}
+
+void orb_trials_list(orb_trials *t) {
+  t->listed = orb_trials_differing(t, ORB_FIND_DIFFERENT, ORB_TRIALS_LISTED, t->list);
 }
 
 orb_status orb_trials_complete(orb_context *ctx, orb_trials *t, int32_t number) {
@@ -357,7 +453,7 @@ void orb_trials_close(orb_trials *t) {
   for (int s = 0; s < 2; s++) {
     orb_coarse_copy_free(t->ctx, &t->copy[s]);
     orb_coarse_copy_free(t->ctx, &t->fine[s]);
-    orb_surroundings_free(t->ctx, &t->around[s]);
+    orb_survey_free(t->ctx, &t->survey[s]);
     orb_free(t->ctx, t->rotated[s]);
   }
   orb_hint_places_free(t->ctx, &t->hint);

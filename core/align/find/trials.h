@@ -1,17 +1,20 @@
 /* Trials: rough maps between decimated copies of two shapes, registered and ranked by how much they bend the copies.
  *
  * In: two meshes, and perhaps places of landmarks on their copies. Out: the trials with their poses and costs, and the
- * best of those that differ. match.h describes the method and writes the result. */
+ * best of those that differ. match.h describes the method and writes the result.
+ *
+ * The time of a trial grows with the square of the vertices. So all trials are made and registered on small copies, and
+ * the best of them are raised to coarse ones, where they are ranked again (raised.h). */
 #ifndef ORB_ALIGN_FIND_TRIALS_H
 #define ORB_ALIGN_FIND_TRIALS_H
 
 #include "align/find/hint.h"
 #include "align/find/params.h"
-#include "elastic/surroundings.h"
+#include "align/find/survey.h"
 #include "spectral/spectral.h"
 
 enum {
-  ORB_TRIALS_MAX = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS,
+  ORB_TRIALS_MAX = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS + ORB_FIND_TIPS,
   ORB_TRIALS_LISTED = 5 /* trials that are listed at most: the best one, and others that differ */
 };
 
@@ -21,7 +24,7 @@ typedef struct orb_trial {
   orb_elastic_pose pose[2];
   double bend[2];
   double rough;    /* cost in the first direction alone */
-  int32_t *own[2]; /* the rough map, if it is an extended one; else NULL */
+  int32_t *own[2]; /* the rough map, if it is an extended or a raised one; else NULL */
   double cost; /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
                   INFINITY as  well, its poses may not be set */
 } orb_trial;
@@ -35,30 +38,38 @@ typedef struct orb_trials {
   orb_context *ctx;
   const orb_mesh *mesh[2]; /* borrowed */
   orb_trial_scaling scaling[2];
-  orb_coarse_copy copy[2];    /* scaled */
-  orb_surroundings around[2]; /* of their vertices */
-  orb_coarse_copy fine[2];    /* the same with more vertices, on which matches are settled; empty before
-                                 orb_trials_refine() */
-  int32_t fine_size;          /* vertices of these */
-  orb_hint_places hint;       /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
-  orb_spectral_dense dense;
-  int32_t *rotated[2]; /* the maps of the rotations, one after the other, laid out as in `dense` */
+  orb_coarse_copy copy[2];  /* scaled */
+  orb_survey survey[2];     /* of them */
+  orb_coarse_copy fine[2];  /* the same with more vertices, on which matches are settled; empty before
+                               orb_trials_refine() */
+  int32_t fine_size;        /* vertices of these */
+  orb_hint_places hint;     /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
+  orb_spectral_dense dense; /* of small copies */
+  int32_t *rotated[2];      /* the maps of the rotations, one after the other, laid out as in `dense` */
   orb_trial trial[ORB_TRIALS_MAX];
   int32_t count;
   int32_t list[ORB_TRIALS_LISTED]; /* see orb_trials_list() */
   int32_t listed;
 } orb_trials;
 
-/* Scales the shapes and makes their copies. Zero the struct before; free it in any case. */
+/* Scales the shapes and makes their coarse copies. Zero the struct before; free it in any case. */
 ORB_MUST_CHECK orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                           orb_trials *trials);
+/* The same with small copies of the coarse ones, which must outlive `small`. Its landmarks are those of `coarse`. */
+ORB_MUST_CHECK orb_status orb_trials_open_small(const orb_trials *coarse, orb_trials *small);
 void orb_trials_close(orb_trials *trials);
 
 /* Makes the fine copies, with `size` vertices, once a match is found. */
 ORB_MUST_CHECK orb_status orb_trials_refine(orb_trials *trials, int32_t size);
 
-/* Makes the trials: spectral maps and rotations of the spheres. Lists the surroundings, which they share. */
+/* Surveys the copies. Call it before trials are made or registered. measured: see orb_survey_create(). */
+ORB_MUST_CHECK orb_status orb_trials_survey(orb_trials *trials, int measured);
+
+/* Adds trials: spectral maps, rotations of the spheres, and, if the surveys are measured, matches of tips. */
 ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);
+
+/* A trial without a cost, with room for poses and for maps of its own. On failure, free it. */
+ORB_MUST_CHECK orb_status orb_trial_create(orb_context *ctx, const orb_trials *trials, orb_trial *out);
 
 /* Drops the trials whose rough maps take the landmarks far away, registers the others in one direction, drops those
  * that are too far behind to win, and registers the others in the other direction. Trials that take the landmarks
@@ -69,8 +80,14 @@ ORB_MUST_CHECK orb_status orb_trials_rank(orb_trials *trials);
 /* The number of the trial of least cost. */
 int32_t orb_trials_best(const orb_trials *trials);
 
-/* Fills list: the best trial and, in order, those that differ from it and from each other and that no landmarks
- * contradict. */
+/* How much the best trial bends the shapes: the mean of both directions. */
+double orb_trials_bend(const orb_trials *trials);
+
+/* Lists the best trial and, in order, those that take the first copy elsewhere than it and than each other by more than
+ * a share of the diagonal, and that no landmarks contradict. list: room for `most`. Returns how many. */
+int32_t orb_trials_differing(const orb_trials *trials, double apart, int32_t most, int32_t *list);
+
+/* Fills list by orb_trials_differing(). */
 void orb_trials_list(orb_trials *trials);
 
 /* Registers trial `number` in the second direction, and sets its cost by both. */

@@ -1,0 +1,160 @@
+/* Trials of creatures whose limbs are known: their tips, and what each step from small copies to coarse ones does. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "align/find/crossed.h"
+#include "align/find/extended.h"
+#include "align/find/raised.h"
+#include "align/find/tips.h"
+#include "align/rotate/procrustes.h"
+#include "support_context.h"
+#include "support_shapes.h"
+
+enum { LIMBS = 5 };
+
+/* Five asymmetric directions, and the lengths of the limbs of two creatures each: some longer, some shorter; and of a
+ * lean one and a stout one. */
+static const double limb[LIMBS][3] = {{1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6}, {-0.48, -0.6, -0.64}, {0, 0.28, 0.96}};
+static const double alike[2][LIMBS] = {{4, 3.4, 2.9, 2.5, 2.2}, {3.2, 3.6, 2.3, 3, 2.6}};
+static const double unlike[2][LIMBS] = {{6, 5, 4, 3, 3.5}, {1.6, 1.8, 1.4, 1.3, 1.5}};
+
+typedef struct scene {
+  orb_mesh mesh[2];
+  orb_trials coarse, small;
+} scene;
+
+static void scene_open(scene *s, const double reach[2][LIMBS]) {
+  memset(s, 0, sizeof *s);
+  for (int k = 0; k < 2; k++) {
+    s->mesh[k] = shape_creature(ctx, LIMBS, limb, reach[k], 4);
+  }
+  assert_int_equal(orb_trials_open(ctx, &s->mesh[0], &s->mesh[1], &s->coarse), ORB_OK);
+  assert_int_equal(orb_trials_open_small(&s->coarse, &s->small), ORB_OK);
+  assert_int_equal(orb_trials_survey(&s->small, 1), ORB_OK);
+}
+
+static void scene_close(scene *s) {
+  orb_trials_close(&s->small);
+  orb_trials_close(&s->coarse);
+  shape_free(ctx, &s->mesh[0]);
+  shape_free(ctx, &s->mesh[1]);
+}
+
+/* The limb at whose end a point of a copy lies. */
+static int limb_at(const orb_mesh *mesh, const double p[3]) {
+  int best = 0;
+  double least = INFINITY;
+  for (int i = 0; i < LIMBS; i++) {
+    const double *tip = mesh->positions + 3 * (size_t)shape_farthest(mesh, limb[i]);
+    const double d = hypot(hypot(tip[0] - p[0], tip[1] - p[1]), tip[2] - p[2]);
+    best = d < least ? i : best;
+    least = fmin(d, least);
+  }
+  return best;
+}
+
+/* The ends of the limbs are the tips, each once. */
+static void limbs_end_in_tips(void **state) {
+  (void)state;
+  scene s;
+  scene_open(&s, alike);
+  for (int k = 0; k < 2; k++) {
+    orb_tips tips;
+    int found[LIMBS] = {0};
+    assert_int_equal(orb_tips_find(ctx, &s.small.copy[k], &s.small.survey[k], &tips), ORB_OK);
+    assert_int_equal(tips.count, LIMBS);
+    for (int32_t i = 0; i < tips.count; i++) {
+      found[limb_at(&s.small.copy[k].mesh, s.small.copy[k].mesh.positions + 3 * (size_t)tips.vertex[i])]++;
+    }
+    for (int i = 0; i < LIMBS; i++) {
+      assert_int_equal(found[i], 1);
+    }
+  }
+  scene_close(&s);
+}
+
+/* The best match pairs the tips of each limb, whatever their lengths, and takes tips to tips, there and back. */
+static void tips_meet_their_partners(void **state) {
+  (void)state;
+  scene s;
+  orb_tips tips[2];
+  orb_tip_match match[3];
+  const orb_tips *const both[2] = {&tips[0], &tips[1]};
+  scene_open(&s, alike);
+  for (int k = 0; k < 2; k++) {
+    assert_int_equal(orb_tips_find(ctx, &s.small.copy[k], &s.small.survey[k], &tips[k]), ORB_OK);
+  }
+  const int32_t count = orb_tips_match(&tips[0], &tips[1], 3, match);
+  assert_in_range(count, 1, 3);
+  assert_int_equal(match[0].count, LIMBS);
+  for (int32_t i = 0; i < LIMBS; i++) {
+    const int32_t to = match[0].to[i];
+    const double *from = s.small.copy[0].mesh.positions + 3 * (size_t)tips[0].vertex[i];
+    const double *there = s.small.copy[1].mesh.positions + 3 * (size_t)tips[1].vertex[to];
+    double p[3];
+    assert_int_equal(limb_at(&s.small.copy[0].mesh, from), limb_at(&s.small.copy[1].mesh, there));
+    orb_tip_match_carry(both, &match[0], 0, tips[0].point[i], p);
+    assert_true(hypot(hypot(p[0] - tips[1].point[to][0], p[1] - tips[1].point[to][1]), p[2] - tips[1].point[to][2]) <
+                0.02);
+    orb_tip_match_carry(both, &match[0], 1, tips[1].point[to], p);
+    assert_true(hypot(hypot(p[0] - tips[0].point[i][0], p[1] - tips[0].point[i][1]), p[2] - tips[0].point[i][2]) <
+                0.02);
+  }
+  for (int32_t i = 1; i < count; i++) {
+    assert_true(match[i - 1].cost <= match[i].cost);
+    assert_memory_not_equal(match[i - 1].to, match[i].to, sizeof(int32_t) * LIMBS);
+  }
+  scene_close(&s);
+}
+
+/* Both poses of the best trial take each limb to its own. */
+static void assert_limbs(const orb_trials *t) {
+  const orb_trial *best = &t->trial[orb_trials_best(t)];
+  for (int s = 0; s < 2; s++) {
+    const orb_mesh *mesh = &t->copy[s].mesh, *other = &t->copy[1 - s].mesh;
+    for (int i = 0; i < LIMBS; i++) {
+      assert_int_equal(limb_at(other, best->pose[s].position + 3 * (size_t)shape_farthest(mesh, limb[i])), i);
+    }
+  }
+}
+
+/* From small copies to coarse ones: crossing bends no trial more, and the best trial keeps every limb. */
+static void best_trial_keeps_limbs(void **state) {
+  (void)state;
+  scene s;
+  double before[ORB_TRIALS_MAX][2];
+  scene_open(&s, unlike);
+  assert_int_equal(orb_trials_make(&s.small), ORB_OK);
+  assert_int_equal(orb_trials_rank(&s.small), ORB_OK);
+  assert_int_equal(orb_trials_extend(&s.small), ORB_OK);
+  for (int32_t i = 0; i < s.small.count; i++) {
+    memcpy(before[i], s.small.trial[i].bend, sizeof before[i]);
+  }
+  assert_true(orb_trials_bend(&s.small) > ORB_FIND_EXTENDS);
+  assert_int_equal(orb_trials_cross(&s.small), ORB_OK);
+  int less = 0;
+  for (int32_t i = 0; i < s.small.count; i++) {
+    for (int k = 0; k < 2; k++) {
+      assert_true(s.small.trial[i].bend[k] <= before[i][k]);
+      less += s.small.trial[i].bend[k] < before[i][k];
+    }
+  }
+  assert_true(less > 0);
+  assert_limbs(&s.small);
+  assert_int_equal(orb_trials_raise(&s.small, &s.coarse), ORB_OK);
+  assert_in_range(s.coarse.count, 1, ORB_FIND_RAISED);
+  assert_int_equal(orb_trials_rank(&s.coarse), ORB_OK);
+  assert_limbs(&s.coarse);
+  scene_close(&s);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_end_in_tips), cmocka_unit_test(tips_meet_their_partners),
+                                     cmocka_unit_test(best_trial_keeps_limbs)};
+  return cmocka_run_group_tests(tests, context_one_thread, context_end);
+}
