@@ -164,7 +164,7 @@ static void add_gradients(const work *w, const double *function, double *gradien
   }
 }
 
-static void fill_triples(const work *w, double *gradient, int mirrored, orb_spectral_shape *out) {
+static void fill_triples(const work *w, double *gradient, orb_spectral_shape *out) {
   size_t n = 3 * (size_t)w->vertices;
   memset(gradient, 0, ORB_SPECTRAL_GRADIENTS * n * sizeof *gradient);
   for (int k = 0; k < ORB_SPECTRAL_GRADIENTS; k++) {
@@ -174,14 +174,13 @@ static void fill_triples(const work *w, double *gradient, int mirrored, orb_spec
     size_t v = 3 * (size_t)out->sample[s];
     for (int i = 0, at = 0; i < ORB_SPECTRAL_GRADIENTS; i++) {
       for (int k = i + 1; k < ORB_SPECTRAL_GRADIENTS; k++, at++) {
-        double triple = orb_det(w->normal + v, gradient + (size_t)i * n + v, gradient + (size_t)k * n + v);
-        out->triple[at][s] = (float)(mirrored ? -triple : triple);
+        out->triple[at][s] = (float)orb_det(w->normal + v, gradient + (size_t)i * n + v, gradient + (size_t)k * n + v);
       }
     }
   }
 }
 
-static orb_status fill(work *w, const orb_mesh *mesh, int mirrored, orb_spectral_shape *out) {
+static orb_status fill(work *w, const orb_mesh *mesh, orb_spectral_shape *out) {
   orb_status status = ORB_E_NO_MEMORY;
   size_t n = (size_t)w->vertices;
   orb_distances distances = {0};
@@ -202,7 +201,7 @@ static orb_status fill(work *w, const orb_mesh *mesh, int mirrored, orb_spectral
     spread(w, &distances, buffer, owner, out);
     fill_samples(w, out);
     fill_heights(w, out);
-    fill_triples(w, buffer, mirrored, out);
+    fill_triples(w, buffer, out);
   }
 end:
   orb_distances_free(w->ctx, &distances);
@@ -228,10 +227,24 @@ orb_status orb_spectral_shape_create(orb_context *ctx, const orb_mesh *mesh, int
   out->height = ORB_NEW(ctx, float, (size_t)ORB_SPECTRAL_SAMPLES *ORB_SPECTRAL_SAMPLES);
   orb_status status = ORB_E_NO_MEMORY;
   if (w.x && w.mass && w.normal && w.entries && out->function && out->distance && out->height) {
-    status = scale_positions(mesh, w.x) ? fill(&w, mesh, mirrored, out) : ORB_OK;
+    status = scale_positions(mesh, w.x) ? fill(&w, mesh, out) : ORB_OK;
   }
   work_free(&w);
+  if (mirrored) {
+    orb_spectral_shape_mirror(out, out);
+  }
   return status;
+}
+
+void orb_spectral_shape_mirror(const orb_spectral_shape *shape, orb_spectral_shape *out) {
+  if (out != shape) {
+    *out = *shape;
+  }
+  for (int at = 0; at < ORB_SPECTRAL_TRIPLES; at++) {
+    for (int s = 0; s < ORB_SPECTRAL_SAMPLES; s++) {
+      out->triple[at][s] = -out->triple[at][s];
+    }
+  }
 }
 
 void orb_spectral_shape_free(orb_context *ctx, orb_spectral_shape *shape) {

@@ -33,10 +33,10 @@ static const double ROUND_TRIP = 0.12; /* a pair whose image comes back farther 
 
 typedef struct search {
   orb_context *ctx;
-  orb_spectral_shape shape[2];
+  const orb_spectral_shape *shape[2];
   orb_zoom_pair pair;
   int from, to; /* levels of the current loop */
-  int32_t count;
+  int32_t starts, count;
   int32_t order[STARTS];
   orb_zoom map[STARTS];
   orb_zoom_cost cost[STARTS];
@@ -93,7 +93,7 @@ static int32_t gather(const search *s, const orb_zoom *map, match *out) {
   for (int back = 0; back < 2; back++) {
     const int32_t *there = back ? map->back : map->forth, *again = back ? map->forth : map->back;
     for (int32_t i = 0; i < orb_spectral_samples(map->detail); i++) {
-      if (s->shape[back].distance[i * ORB_SPECTRAL_SAMPLES + again[there[i]]] < ROUND_TRIP) {
+      if (s->shape[back]->distance[i * ORB_SPECTRAL_SAMPLES + again[there[i]]] < ROUND_TRIP) {
         out[count++] = (match){{back ? there[i] : i, back ? i : there[i]}, back, INFINITY};
       }
     }
@@ -104,7 +104,7 @@ static int32_t gather(const search *s, const orb_zoom *map, match *out) {
 static void add_pair(const search *s, const orb_zoom *map, const match *one, orb_spectral_candidate *out) {
   int own = one->back;
   int32_t *list[2] = {out->first, out->second};
-  list[own][out->count] = s->shape[own].sample[one->sample[own]];
+  list[own][out->count] = s->shape[own]->sample[one->sample[own]];
   list[1 - own][out->count] = orb_zoom_image(&s->pair, map, one->sample[own], own);
   for (int32_t k = 0; k < out->count; k++) {
     if (list[0][k] == list[0][out->count] || list[1][k] == list[1][out->count]) {
@@ -123,7 +123,7 @@ static void spread_pairs(const search *s, const orb_zoom *map, match *list, int3
     add_pair(s, map, &one, out);
     for (int32_t i = 0; i < count; i++) {
       for (int k = 0; k < 2; k++) {
-        float d = s->shape[k].distance[one.sample[k] * ORB_SPECTRAL_SAMPLES + list[i].sample[k]];
+        float d = s->shape[k]->distance[one.sample[k] * ORB_SPECTRAL_SAMPLES + list[i].sample[k]];
         list[i].away = d < list[i].away ? d : list[i].away;
       }
       next = list[i].away > list[next].away ? i : next;
@@ -140,8 +140,8 @@ static void write_candidate(const search *s, int32_t at, orb_spectral_candidate 
 }
 
 static orb_status run(search *s, orb_spectral_list *out) {
-  ORB_TRY(orb_zoom_pair_create(s->ctx, &s->shape[0], &s->shape[1], &s->pair));
-  for (s->count = 0; s->count < STARTS; s->count++) {
+  ORB_TRY(orb_zoom_pair_create(s->ctx, s->shape[0], s->shape[1], &s->pair));
+  for (s->count = 0; s->count < s->starts; s->count++) {
     s->order[s->count] = s->count;
     orb_zoom_start(order_of_functions[s->count / SIGNS], (uint32_t)s->count % SIGNS, &s->map[s->count]);
   }
@@ -171,8 +171,8 @@ static void fill_dense(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-static orb_status write_dense(search *s, int32_t most, const orb_mesh *a, const orb_mesh *b, orb_spectral_dense *out) {
-  size_t n[2] = {(size_t)a->vertex_count, (size_t)b->vertex_count};
+static orb_status write_dense(search *s, int32_t most, orb_spectral_dense *out) {
+  const size_t n[2] = {(size_t)s->shape[0]->mesh->vertex_count, (size_t)s->shape[1]->mesh->vertex_count};
   out->forth = ORB_NEW(s->ctx, int32_t, ORB_SPECTRAL_MAX * n[0]);
   out->back = ORB_NEW(s->ctx, int32_t, ORB_SPECTRAL_MAX * n[1]);
   if (!out->forth || !out->back) {
@@ -187,49 +187,79 @@ static orb_status write_dense(search *s, int32_t most, const orb_mesh *a, const 
   return ORB_OK;
 }
 
+/* Searches between usable shapes from the first `starts` starts. dense: NULL, or where maps take every vertex. */
+static orb_status find(orb_context *ctx, const orb_spectral_shape *a, const orb_spectral_shape *b, int32_t starts,
+                       int32_t most, orb_spectral_list *out, orb_spectral_dense *dense) {
+  orb_status status;
+  memset(out, 0, sizeof *out);
+  if (!a->is_usable || !b->is_usable) {
+    return ORB_OK;
+  }
+  search *s = ORB_NEW0(ctx, search, 1);
+  if (!s) {
+    return ORB_E_NO_MEMORY;
+  }
+  s->ctx = ctx;
+  s->shape[0] = a;
+  s->shape[1] = b;
+  s->starts = starts;
+  ORB_GO(status, run(s, out), end);
+  if (dense) {
+    status = write_dense(s, most, dense);
+  }
+end:
+  orb_zoom_pair_free(ctx, &s->pair);
+  orb_free(ctx, s);
+  return status;
+}
+
 typedef struct shape_job {
-  search *s;
+  orb_spectral_shape shape[2];
   const orb_mesh *mesh[2];
   int mirrored;
 } shape_job;
 
 static orb_status create_shape(orb_context *ctx, void *arg, int32_t i) {
-  const shape_job *job = arg;
-  return orb_spectral_shape_create(ctx, job->mesh[i], i == 1 && job->mirrored, &job->s->shape[i]);
-}
-
-static orb_status find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored, int32_t most,
-                       orb_spectral_list *out, orb_spectral_dense *dense) {
-  orb_status status;
-  search *s = ORB_NEW0(ctx, search, 1);
-  memset(out, 0, sizeof *out);
-  if (!s) {
-    return ORB_E_NO_MEMORY;
-  }
-  s->ctx = ctx;
-  shape_job job = {s, {a, b}, mirrored};
-  ORB_GO(status, orb_tasks_run(ctx, 2, create_shape, &job), end);
-  if (s->shape[0].is_usable && s->shape[1].is_usable) {
-    ORB_GO(status, run(s, out), end);
-    if (dense) {
-      status = write_dense(s, most, a, b, dense);
-    }
-  }
-end:
-  orb_zoom_pair_free(ctx, &s->pair);
-  orb_spectral_shape_free(ctx, &s->shape[0]);
-  orb_spectral_shape_free(ctx, &s->shape[1]);
-  orb_free(ctx, s);
-  return status;
+  shape_job *job = arg;
+  return orb_spectral_shape_create(ctx, job->mesh[i], i == 1 && job->mirrored, &job->shape[i]);
 }
 
 orb_status orb_spectral_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored,
                              orb_spectral_list *out) {
-  return find(ctx, a, b, mirrored, 0, out, NULL);
+  orb_status status;
+  shape_job *job = ORB_NEW0(ctx, shape_job, 1);
+  memset(out, 0, sizeof *out);
+  if (!job) {
+    return ORB_E_NO_MEMORY;
+  }
+  job->mesh[0] = a;
+  job->mesh[1] = b;
+  job->mirrored = mirrored;
+  ORB_GO(status, orb_tasks_run(ctx, 2, create_shape, job), end);
+  status = find(ctx, &job->shape[0], &job->shape[1], STARTS, 0, out, NULL);
+end:
+  orb_spectral_shape_free(ctx, &job->shape[0]);
+  orb_spectral_shape_free(ctx, &job->shape[1]);
+  orb_free(ctx, job);
+  return status;
 }
 
-orb_status orb_spectral_find_dense(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int32_t most,
-                                   orb_spectral_list *out, orb_spectral_dense *dense) {
-  dense->forth = dense->back = NULL;
-  return find(ctx, a, b, 0, most, out, dense);
+orb_status orb_spectral_find_dense(orb_context *ctx, const orb_spectral_shape *a, const orb_spectral_shape *b,
+                                   int32_t most, orb_spectral_list *out, orb_spectral_dense *dense) {
+  *dense = (orb_spectral_dense){NULL, NULL};
+  return find(ctx, a, b, STARTS, most, out, dense);
+}
+
+/* Each eigenfunction of a symmetric body is even or odd. So functions keep their order, and only signs are open. */
+orb_status orb_spectral_find_mirror(orb_context *ctx, const orb_spectral_shape *shape, int32_t most,
+                                    orb_spectral_list *out, orb_spectral_dense *dense) {
+  orb_spectral_shape *mirrored = ORB_NEW(ctx, orb_spectral_shape, 1);
+  *dense = (orb_spectral_dense){NULL, NULL};
+  if (!mirrored) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_spectral_shape_mirror(shape, mirrored);
+  const orb_status status = find(ctx, shape, mirrored, SIGNS, most, out, dense);
+  orb_free(ctx, mirrored);
+  return status;
 }

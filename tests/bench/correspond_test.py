@@ -32,6 +32,15 @@ class Correspond(unittest.TestCase):
     def tearDownClass(cls):
         cls.folder.cleanup()
 
+    def test_a_seed_draws_the_same_pairs_of_all_kinds(self):
+        rows = correspond_pairs.drawn(17)
+        self.assertEqual(rows, correspond_pairs.drawn(17))
+        self.assertNotEqual(rows, correspond_pairs.drawn(18))
+        kinds = [frozenset(name.split("-")[0] for name in row[:2]) for row in rows]
+        self.assertEqual({len(both) for both in kinds}, {2})
+        self.assertEqual({kinds.count(both) for both in kinds}, {4})
+        self.assertEqual(len(set(kinds)), 21)
+
     def test_bodies_are_closed_and_of_their_own_triangles(self):
         for surface in self.surfaces:
             edges = {(t[k], t[(k + 1) % 3]) for t in surface.triangles for k in range(3)}

@@ -40,9 +40,7 @@ static const float *from_mark(const orb_agreed *a, int s, int32_t k) {
 
 static void fill_images(orb_agreed *a, const double *const position[2]) {
   for (int s = 0; s < 2; s++) {
-    for (int32_t v = 0; v < a->mesh[s]->vertex_count; v++) {
-      a->image[s][v] = orb_survey_nearest(a->survey[1 - s], a->mesh[1 - s], position[s] + 3 * (size_t)v);
-    }
+    orb_survey_images(a->survey[1 - s], a->mesh[1 - s], position[s], a->mesh[s]->vertex_count, a->image[s]);
   }
 }
 

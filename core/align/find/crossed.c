@@ -6,13 +6,6 @@
 #include "base/tasks.h"
 #include "numeric/vec3.h"
 
-/* The vertices on which pose s takes the vertices of copy s. */
-static void fill_images(const orb_trials *t, const orb_trial *one, int s, int32_t *out) {
-  for (int32_t v = 0; v < t->copy[s].mesh.vertex_count; v++) {
-    out[v] = orb_survey_nearest(&t->survey[1 - s], &t->copy[1 - s].mesh, one->pose[s].position + 3 * (size_t)v);
-  }
-}
-
 /* For each vertex of the other copy, the vertex of copy s that pose s takes nearest to it. */
 static void fill_inverse(const orb_trials *t, const orb_trial *one, int s, int32_t *out) {
   const orb_mesh *mesh = &t->copy[s].mesh, *other = &t->copy[1 - s].mesh;
@@ -36,7 +29,7 @@ static orb_status cross(orb_context *ctx, void *arg, int32_t i) {
   ORB_GO(status, orb_trial_create(ctx, t, &crossed), end);
   for (int s = 0; s < 2; s++) {
     fill_inverse(t, one, 1 - s, crossed.own[s]);
-    fill_images(t, one, 1 - s, crossed.own[1 - s]);
+    orb_trial_images(t, one, 1 - s, crossed.own[1 - s]);
     ORB_GO(status, orb_trial_register(ctx, t, &crossed, s), end);
   }
   for (int s = 0; s < 2; s++) {

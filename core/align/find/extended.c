@@ -12,6 +12,7 @@
 typedef struct chains {
   orb_trials *t;
   double most; /* cost of a trial that is extended again */
+  int rounds;
 } chains;
 
 /* Copies the positions of a trial. `out` has maps of its own, still to be filled, and no cost. */
@@ -56,7 +57,7 @@ static orb_status run_chain(orb_context *ctx, void *arg, int32_t i) {
   }
   ORB_GO(status, orb_agreed_create(ctx, mesh, survey, &agreed), end);
   ORB_GO(status, copy_trial(ctx, t, best, &next), end);
-  for (int round = 0; round < ORB_FIND_EXTENSIONS; round++) {
+  for (int round = 0; round < all->rounds; round++) {
     ORB_GO(status, extend(ctx, t, &agreed, &next, round == 0 ? ORB_FIND_AGREED_INNER : 1, &extended), end);
     if (!extended) {
       break;
@@ -87,5 +88,6 @@ orb_status orb_trials_extend(orb_trials *t) {
     return ORB_OK;
   }
   all.most = ORB_FIND_EXTENDS_BEHIND * best->cost;
+  all.rounds = orb_trials_are_symmetric(t) ? ORB_FIND_EXTENSIONS_MIRRORED : ORB_FIND_EXTENSIONS;
   return orb_tasks_run(t->ctx, t->count, run_chain, &all);
 }

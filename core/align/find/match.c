@@ -5,6 +5,7 @@
 
 #include "align/find/crossed.h"
 #include "align/find/extended.h"
+#include "align/find/mirrored.h"
 #include "align/find/params.h"
 #include "align/find/raised.h"
 #include "align/find/trials.h"
@@ -186,9 +187,20 @@ static int is_one_shape(const orb_trial *one, const orb_match_hint *hint, double
   return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
 }
 
-/* Makes trials of small copies, and raises the best of them. Those that bend much are extended before, unless landmarks
- * say which limb is which. Small copies have too few vertices for thin limbs: bodies in poses, which bend little, get
- * the trials of coarse copies too. */
+/* Improves trials that bend small copies much, unless landmarks say which limb is which. */
+static orb_status improve_trials(orb_trials *small) {
+  if (small->hint.count > 0 || !(orb_trials_bend(small) > ORB_FIND_EXTENDS)) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_trials_find_symmetries(small));
+  ORB_TRY(orb_trials_extend(small));
+  ORB_TRY(orb_trials_cross(small));
+  ORB_TRY(orb_trials_weigh_asymmetry(small, small));
+  return orb_trials_mirror(small);
+}
+
+/* Makes trials of small copies, raises the best of them, and ranks these. Small copies have too few vertices for thin
+ * limbs: bodies in poses, which bend little, get the trials of coarse copies too. */
 static orb_status fill_trials(orb_trials *t) {
   orb_status status = ORB_E_NO_MEMORY;
   orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
@@ -200,13 +212,15 @@ static orb_status fill_trials(orb_trials *t) {
   ORB_GO(status, orb_trials_make(small), end);
   ORB_GO(status, orb_trials_rank(small), end);
   const int bends_little = orb_trials_bend(small) <= ORB_FIND_COARSE_TOO;
-  if (t->hint.count == 0) {
-    ORB_GO(status, orb_trials_extend(small), end);
-    ORB_GO(status, orb_trials_cross(small), end);
-  }
+  ORB_GO(status, improve_trials(small), end);
   ORB_GO(status, orb_trials_raise(small, t), end);
   if (bends_little) {
-    status = orb_trials_make(t);
+    ORB_GO(status, orb_trials_make(t), end);
+  }
+  ORB_GO(status, orb_trials_rank(t), end);
+  if (t->hint.count == 0) {
+    ORB_GO(status, orb_trials_cross(t), end);
+    status = orb_trials_weigh_asymmetry(small, t);
   }
 end:
   orb_trials_close(small);
@@ -226,7 +240,6 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     return ORB_OK;
   }
   ORB_TRY(fill_trials(t));
-  ORB_TRY(orb_trials_rank(t));
   int32_t best = orb_trials_best(t);
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
     return ORB_OK;
@@ -234,9 +247,6 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->is_unsure = !is_one_shape(&t->trial[best], hint, stretch);
   if (out->is_unsure) {
     return ORB_OK;
-  }
-  if (!hint) {
-    ORB_TRY(orb_trials_cross(t));
   }
   out->is_found = 1;
   out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;

@@ -18,9 +18,7 @@ static orb_status map_vertices(orb_context *ctx, const raising *all, const orb_t
   const orb_mesh *mesh = &all->coarse->copy[s].mesh, *other = &all->coarse->copy[1 - s].mesh;
   ORB_TRY(orb_elastic_carry(ctx, &all->small->copy[s].mesh, &from->pose[s], mesh->positions, mesh->vertex_count,
                             &out->pose[s]));
-  for (int32_t v = 0; v < mesh->vertex_count; v++) {
-    out->own[s][v] = orb_survey_nearest(&all->coarse->survey[1 - s], other, out->pose[s].position + 3 * (size_t)v);
-  }
+  orb_survey_images(&all->coarse->survey[1 - s], other, out->pose[s].position, mesh->vertex_count, out->own[s]);
   return ORB_OK;
 }
 
@@ -35,6 +33,7 @@ static orb_status raise_one(orb_context *ctx, void *arg, int32_t i) {
   ORB_TRY(map_vertices(ctx, all, from, 0, out));
   ORB_TRY(map_vertices(ctx, all, from, 1, out));
   out->cost = out->rough = 0;
+  out->asymmetry = from->asymmetry;
   return ORB_OK;
 }
 

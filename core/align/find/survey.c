@@ -54,3 +54,10 @@ int32_t orb_survey_nearest(const orb_survey *survey, const orb_mesh *mesh, const
   (void)orb_nearest_query(survey->tree, point, INFINITY, &place);
   return orb_map_nearest_corner(mesh->triangles, &place);
 }
+
+void orb_survey_images(const orb_survey *survey, const orb_mesh *mesh, const double *points, int32_t count,
+                       int32_t *out) {
+  for (int32_t i = 0; i < count; i++) {
+    out[i] = orb_survey_nearest(survey, mesh, points + 3 * (size_t)i);
+  }
+}

@@ -132,9 +132,15 @@ static orb_status add_trial(orb_trials *t, const int32_t *forth, const int32_t *
   return ORB_OK;
 }
 
+static orb_status make_spectral_shape(orb_context *ctx, void *arg, int32_t s) {
+  orb_trials *t = arg;
+  return orb_spectral_shape_create(ctx, &t->copy[s].mesh, 0, &t->spectral[s]);
+}
+
 static orb_status add_spectral(orb_trials *t) {
   orb_spectral_list list;
-  ORB_TRY(orb_spectral_find_dense(t->ctx, &t->copy[0].mesh, &t->copy[1].mesh, ORB_FIND_SPECTRAL, &list, &t->dense));
+  ORB_TRY(orb_tasks_run(t->ctx, 2, make_spectral_shape, t));
+  ORB_TRY(orb_spectral_find_dense(t->ctx, &t->spectral[0], &t->spectral[1], ORB_FIND_SPECTRAL, &list, &t->dense));
   for (int32_t i = 0; i < list.count && i < ORB_FIND_SPECTRAL; i++) {
     if (list.candidate[i].cost <= list.candidate[0].cost + ORB_FIND_SPECTRAL_BEHIND) {
       ORB_TRY(add_trial(t, t->dense.forth + (size_t)i * (size_t)t->copy[0].mesh.vertex_count,
@@ -239,6 +245,19 @@ orb_status orb_trials_survey(orb_trials *t, int measured) {
   return orb_tasks_run(t->ctx, 2, survey, &all);
 }
 
+static orb_status find_symmetry(orb_context *ctx, void *arg, int32_t s) {
+  orb_trials *t = arg;
+  return orb_symmetry_find(ctx, &t->survey[s], &t->spectral[s], &t->symmetry[s]);
+}
+
+orb_status orb_trials_find_symmetries(orb_trials *t) {
+  return orb_tasks_run(t->ctx, 2, find_symmetry, t);
+}
+
+int orb_trials_are_symmetric(const orb_trials *t) {
+  return t->symmetry[0].count > 0 && t->symmetry[1].count > 0;
+}
+
 orb_status orb_trials_make(orb_trials *t) {
   ORB_TRY(add_spectral(t));
   ORB_TRY(add_rotations(t));
@@ -297,12 +316,17 @@ static double rotation_of(const orb_trials *t, const orb_trial *one, int s) {
   return acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
 }
 
+void orb_trial_images(const orb_trials *t, const orb_trial *one, int s, int32_t *out) {
+  orb_survey_images(&t->survey[1 - s], &t->copy[1 - s].mesh, one->pose[s].position, t->copy[s].mesh.vertex_count, out);
+}
+
 void orb_trial_fill_cost(const orb_trials *t, orb_trial *one, int directions) {
   double bend = 0;
   for (int s = 0; s < directions; s++) {
     bend += one->bend[s] / directions;
   }
-  one->cost = bend * (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0));
+  one->cost =
+      bend * (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0)) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
 }
 
 int32_t orb_trials_best(const orb_trials *t) {
@@ -454,6 +478,8 @@ void orb_trials_close(orb_trials *t) {
     orb_coarse_copy_free(t->ctx, &t->copy[s]);
     orb_coarse_copy_free(t->ctx, &t->fine[s]);
     orb_survey_free(t->ctx, &t->survey[s]);
+    orb_spectral_shape_free(t->ctx, &t->spectral[s]);
+    orb_symmetry_free(t->ctx, &t->symmetry[s]);
     orb_free(t->ctx, t->rotated[s]);
   }
   orb_hint_places_free(t->ctx, &t->hint);

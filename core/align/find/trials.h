@@ -11,6 +11,7 @@
 #include "align/find/hint.h"
 #include "align/find/params.h"
 #include "align/find/survey.h"
+#include "align/find/symmetry.h"
 #include "spectral/spectral.h"
 
 enum {
@@ -23,8 +24,9 @@ typedef struct orb_trial {
   orb_rough_map map[2];
   orb_elastic_pose pose[2];
   double bend[2];
-  double rough;    /* cost in the first direction alone */
-  int32_t *own[2]; /* the rough map, if it is an extended or a raised one; else NULL */
+  double rough;     /* cost in the first direction alone */
+  double asymmetry; /* see mirrored.h; 0: not known */
+  int32_t *own[2];  /* the rough map, if it is an extended or a raised one; else NULL */
   double cost; /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
                   INFINITY as  well, its poses may not be set */
 } orb_trial;
@@ -38,14 +40,16 @@ typedef struct orb_trials {
   orb_context *ctx;
   const orb_mesh *mesh[2]; /* borrowed */
   orb_trial_scaling scaling[2];
-  orb_coarse_copy copy[2];  /* scaled */
-  orb_survey survey[2];     /* of them */
-  orb_coarse_copy fine[2];  /* the same with more vertices, on which matches are settled; empty before
-                               orb_trials_refine() */
-  int32_t fine_size;        /* vertices of these */
-  orb_hint_places hint;     /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
-  orb_spectral_dense dense; /* of small copies */
-  int32_t *rotated[2];      /* the maps of the rotations, one after the other, laid out as in `dense` */
+  orb_coarse_copy copy[2];        /* scaled */
+  orb_survey survey[2];           /* of them */
+  orb_spectral_shape spectral[2]; /* likewise; set by orb_trials_make() */
+  orb_symmetry symmetry[2];       /* likewise; none before orb_trials_find_symmetries() */
+  orb_coarse_copy fine[2];        /* the same with more vertices, on which matches are settled; empty before
+                                     orb_trials_refine() */
+  int32_t fine_size;              /* vertices of these */
+  orb_hint_places hint;           /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
+  orb_spectral_dense dense;       /* of small copies */
+  int32_t *rotated[2];            /* the maps of the rotations, one after the other, laid out as in `dense` */
   orb_trial trial[ORB_TRIALS_MAX];
   int32_t count;
   int32_t list[ORB_TRIALS_LISTED]; /* see orb_trials_list() */
@@ -67,6 +71,12 @@ ORB_MUST_CHECK orb_status orb_trials_survey(orb_trials *trials, int measured);
 
 /* Adds trials: spectral maps, rotations of the spheres, and, if the surveys are measured, matches of tips. */
 ORB_MUST_CHECK orb_status orb_trials_make(orb_trials *trials);
+
+/* Finds the symmetries of the copies, after orb_trials_make() and with surveys that are measured. */
+ORB_MUST_CHECK orb_status orb_trials_find_symmetries(orb_trials *trials);
+
+/* Whether both copies have a symmetry that was found. */
+int orb_trials_are_symmetric(const orb_trials *trials);
 
 /* A trial without a cost, with room for poses and for maps of its own. On failure, free it. */
 ORB_MUST_CHECK orb_status orb_trial_create(orb_context *ctx, const orb_trials *trials, orb_trial *out);
@@ -96,6 +106,9 @@ ORB_MUST_CHECK orb_status orb_trials_complete(orb_context *ctx, orb_trials *tria
 /* Registers a trial of these copies in direction s, along its maps: fills its pose and its bend. May run beside others.
  */
 ORB_MUST_CHECK orb_status orb_trial_register(orb_context *ctx, const orb_trials *trials, orb_trial *one, int s);
+
+/* The vertices of the other copy on which pose s takes those of copy s. */
+void orb_trial_images(const orb_trials *trials, const orb_trial *one, int s, int32_t *out);
 
 /* Sets the cost of a trial by the first direction or by both, which must have been registered. */
 void orb_trial_fill_cost(const orb_trials *trials, orb_trial *one, int directions);

@@ -1,0 +1,161 @@
+/* The symmetry of a creature whose mirror plane is known, and trials that do not keep it. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "align/find/mirrored.h"
+#include "support_context.h"
+#include "support_shapes.h"
+
+enum { LIMBS = 5, TWIN = 1, MIDDLE = 4 };
+
+/* Two pairs of limbs and one in the middle: the plane x = 0 is that of the symmetry. */
+static const double limb[LIMBS][3] = {
+    {0.8, -0.6, 0}, {-0.8, -0.6, 0}, {0.6, 0.64, 0.48}, {-0.6, 0.64, 0.48}, {0, 0, -1}};
+static const double reach[LIMBS] = {3.5, 3.5, 2.5, 2.5, 3};
+typedef struct scene {
+  orb_mesh mesh[2];
+  orb_trials coarse, small;
+} scene;
+
+/* Trials between the creature and itself, and its symmetries. */
+static void scene_open(scene *s) {
+  memset(s, 0, sizeof *s);
+  s->mesh[0] = shape_creature(ctx, LIMBS, limb, reach, 4);
+  s->mesh[1] = shape_creature(ctx, LIMBS, limb, reach, 4);
+  assert_int_equal(orb_trials_open(ctx, &s->mesh[0], &s->mesh[1], &s->coarse), ORB_OK);
+  assert_int_equal(orb_trials_open_small(&s->coarse, &s->small), ORB_OK);
+  assert_int_equal(orb_trials_survey(&s->small, 1), ORB_OK);
+  assert_int_equal(orb_trials_make(&s->small), ORB_OK);
+  assert_int_equal(orb_trials_find_symmetries(&s->small), ORB_OK);
+}
+
+static void scene_close(scene *s) {
+  orb_trials_close(&s->small);
+  orb_trials_close(&s->coarse);
+  shape_free(ctx, &s->mesh[0]);
+  shape_free(ctx, &s->mesh[1]);
+}
+
+static double distance(const double *p, const double *q) {
+  return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+}
+
+/* The limb nearest to a point, or −1: none is within the distance of the end of one. */
+static int limb_at(const orb_mesh *mesh, const double p[3], double within) {
+  int best = -1;
+  for (int i = 0; i < LIMBS; i++) {
+    const double d = distance(mesh->positions + 3 * (size_t)shape_farthest(mesh, limb[i]), p);
+    best = d < within ? i : best;
+    within = fmin(d, within);
+  }
+  return best;
+}
+
+/* The mirror image of each vertex is nearest to x → −x, within the length of an edge or two in the mean. */
+static void symmetry_is_found(void **state) {
+  (void)state;
+  scene s;
+  scene_open(&s);
+  for (int k = 0; k < 2; k++) {
+    const orb_mesh *mesh = &s.small.copy[k].mesh;
+    double sum = 0;
+    assert_true(s.small.symmetry[k].count > 0);
+    for (int32_t v = 0; v < mesh->vertex_count; v++) {
+      const double *p = mesh->positions + 3 * (size_t)v;
+      const double mirrored[3] = {-p[0], p[1], p[2]};
+      sum += distance(mirrored, mesh->positions + 3 * (size_t)s.small.symmetry[k].image[0][v]) / mesh->vertex_count;
+    }
+    assert_true(sum < 0.2); /* the copy has the area of the unit sphere; its limbs lie apart by more than 1 */
+  }
+  scene_close(&s);
+}
+
+/* Replaces all trials by one that leaves every vertex in place, or exchanges two limbs. */
+static orb_trial *only_trial(scene *s, int from, int to) {
+  orb_trials *t = &s->small;
+  for (int32_t i = 0; i < t->count; i++) {
+    orb_trial_free(ctx, &t->trial[i]);
+  }
+  t->count = 1;
+  orb_trial *one = &t->trial[0];
+  assert_int_equal(orb_trial_create(ctx, t, one), ORB_OK);
+  for (int k = 0; k < 2; k++) {
+    const orb_mesh *mesh = &t->copy[k].mesh;
+    memcpy(one->pose[k].position, mesh->positions, 3 * (size_t)mesh->vertex_count * sizeof(double));
+    one->bend[k] = 0.3;
+    for (int32_t v = 0; v < mesh->vertex_count && from != to; v++) {
+      double *p = one->pose[k].position + 3 * (size_t)v;
+      const int at = limb_at(mesh, p, 1);
+      if (at == from || at == to) {
+        memcpy(p, mesh->positions + 3 * (size_t)shape_farthest(mesh, limb[at == from ? to : from]), sizeof(double[3]));
+      }
+    }
+  }
+  one->cost = one->rough = 0.3;
+  return one;
+}
+
+/* A map that keeps the symmetry is off by what copies differ. One that exchanges a paired limb with the one in the
+ * middle is off by far more, and costs more. */
+static void wrong_limbs_are_asymmetric(void **state) {
+  (void)state;
+  scene s;
+  scene_open(&s);
+  const orb_trial *one = only_trial(&s, 0, 0);
+  assert_int_equal(orb_trials_weigh_asymmetry(&s.small, &s.small), ORB_OK);
+  const double right = one->asymmetry, cost = one->cost;
+  one = only_trial(&s, TWIN, MIDDLE);
+  assert_int_equal(orb_trials_weigh_asymmetry(&s.small, &s.small), ORB_OK);
+  assert_true(right < 0.2);
+  assert_true(one->asymmetry > 2 * right && one->asymmetry > 0.3);
+  assert_true(one->cost > cost);
+  one = only_trial(&s, 0, TWIN); /* left and right exchanged keeps the symmetry */
+  assert_int_equal(orb_trials_weigh_asymmetry(&s.small, &s.small), ORB_OK);
+  assert_true(one->asymmetry < 0.3);
+  scene_close(&s);
+}
+
+/* Mirrored from the side that is right, a trial with a paired limb and the middle one exchanged becomes right. */
+static void right_side_mends_the_wrong_one(void **state) {
+  (void)state;
+  scene s;
+  scene_open(&s);
+  only_trial(&s, TWIN, MIDDLE);
+  assert_int_equal(orb_trials_weigh_asymmetry(&s.small, &s.small), ORB_OK);
+  assert_int_equal(orb_trials_mirror(&s.small), ORB_OK);
+  const orb_trial *one = &s.small.trial[0];
+  for (int k = 0; k < 2; k++) {
+    const orb_mesh *mesh = &s.small.copy[k].mesh, *other = &s.small.copy[1 - k].mesh;
+    for (int i = 0; i < LIMBS; i++) {
+      const double *end = one->pose[k].position + 3 * (size_t)shape_farthest(mesh, limb[i]);
+      assert_int_equal(limb_at(other, end, 1), i);
+    }
+  }
+  assert_true(one->asymmetry < 0.2 && (one->bend[0] + one->bend[1]) / 2 < 0.1);
+  scene_close(&s);
+}
+
+/* Where one of the shapes has no symmetry, nothing is weighed or mirrored. */
+static void nothing_happens_without_symmetry(void **state) {
+  (void)state;
+  scene s;
+  scene_open(&s);
+  orb_symmetry_free(ctx, &s.small.symmetry[1]);
+  const orb_trial *one = only_trial(&s, TWIN, MIDDLE);
+  assert_int_equal(orb_trials_weigh_asymmetry(&s.small, &s.small), ORB_OK);
+  assert_int_equal(orb_trials_mirror(&s.small), ORB_OK);
+  assert_true(one->asymmetry == 0 && one->cost == 0.3);
+  scene_close(&s);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(symmetry_is_found), cmocka_unit_test(nothing_happens_without_symmetry),
+      cmocka_unit_test(wrong_limbs_are_asymmetric), cmocka_unit_test(right_side_mends_the_wrong_one)};
+  return cmocka_run_group_tests(tests, context_one_thread, context_end);
+}
