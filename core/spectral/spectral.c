@@ -205,6 +205,7 @@ static orb_status find(orb_context *ctx, const orb_spectral_shape *a, const orb_
   s->starts = starts;
   ORB_GO(status, run(s, out), end);
   if (dense) {
+    out->count = out->count < most ? out->count : most;
     status = write_dense(s, most, dense);
   }
 end:

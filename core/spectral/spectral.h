@@ -1,6 +1,6 @@
 /* Maps between two shapes without landmarks, from the vibrations of their surfaces.
  *
- * In: two closed meshes of one to two thousand vertices, as decimation leaves them. Out: a list of maps that
+ * In: two closed meshes of a few hundred to two thousand vertices, as decimation leaves them. Out: a list of maps that
  * differ, best first, each as pairs of vertices and a cost. Bending a surface hardly changes its eigenfunctions, so a
  * pose does not matter; proportions may differ by a third. Read in this order:
  *

@@ -1,6 +1,7 @@
 #include "align/find/contest.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "align/find/params.h"
 #include "align/map/draft.h"
@@ -20,8 +21,8 @@ typedef struct contest {
   double *target[MOST]; /* of the matches */
   orb_map_draft *draft[MOST];
   double energy[MOST];        /* of walks, then of finished maps; INFINITY: not walked, or none leads to a map */
+  double walked[MOST];        /* of walks alone */
   double known;               /* energy of the best walk of an earlier round, or INFINITY */
-  double walked;              /* energy of the best walk of the match */
   int32_t round[MOST], count; /* those that walk, and later those that are finished, side by side */
 } contest;
 
@@ -72,13 +73,13 @@ static orb_status walk_all(orb_context *ctx, contest *c) {
   c->round[1] = TURNED;
   c->count = first_may_move(c) ? 2 : 1;
   ORB_TRY(orb_tasks_run(ctx, c->count, walk, c));
-  c->known = c->walked = fmin(c->energy[MATCH], c->energy[TURNED]);
+  c->known = fmin(c->energy[MATCH], c->energy[TURNED]);
   if (c->known <= ORB_FIND_CONTEST_POOR) {
     return ORB_OK;
   }
   c->round[0] = SPACE;
   c->round[1] = SECOND;
-  c->count = c->match->other_count > 0 ? 2 : 1;
+  c->count = c->match->other_count > 0 && c->match->other[0].cost <= ORB_FIND_OTHER_BEHIND ? 2 : 1;
   return orb_tasks_run(ctx, c->count, walk, c);
 }
 
@@ -91,6 +92,7 @@ static orb_status finish(orb_context *ctx, void *arg, int32_t i) {
 /* Finishes the best walk, and the next one if it is close. Frees all other drafts. */
 static orb_status finish_best(orb_context *ctx, contest *c) {
   const int32_t best = least_of(c, -1), next = least_of(c, best);
+  memcpy(c->walked, c->energy, sizeof c->walked);
   c->count = 1;
   c->round[0] = best < 0 ? MATCH : best;
   if (next >= 0 && c->energy[next] - 1 <= ORB_FIND_CONTEST_CLOSE * (c->energy[best] - 1)) {
@@ -105,6 +107,16 @@ static orb_status finish_best(orb_context *ctx, contest *c) {
   return orb_tasks_run(ctx, c->count, finish, c);
 }
 
+/* How far the match is behind the next best one, which has won: by finished maps if both were finished, or by walks. */
+static double lead_of_second(const contest *c) {
+  const double poor = orb_map_params_of(c->preset).energy.poor;
+  const int32_t other = c->round[0] == SECOND ? c->round[c->count - 1] : c->round[0];
+  const int both = other == MATCH || other == TURNED;
+  const double own = both ? c->energy[SECOND] : c->walked[SECOND];
+  const double its = both ? c->energy[other] : fmin(c->walked[MATCH], c->walked[TURNED]);
+  return fmax(0, 1 - own / fmin(its, poor));
+}
+
 /* Takes the better map. Of two that are as good, the first of the contestants wins. */
 static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *out) {
   const int32_t first = c->count == 2 && c->round[1] < c->round[0], second = c->count - 1 - first;
@@ -115,7 +127,7 @@ static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *
   out->is_space = winner == SPACE;
   out->is_second = winner == SECOND;
   if (winner == SECOND) {
-    out->clear = fmax(0, 1 - c->energy[SECOND] / fmin(c->walked, orb_map_params_of(c->preset).energy.poor));
+    out->clear = lead_of_second(c);
   }
   return orb_map_draft_take(ctx, c->draft[winner], &c->alignment->energy);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/context.h"
 #include "base/tasks.h"
 #include "numeric/vec3.h"
 
@@ -11,6 +12,7 @@ static void fill_inverse(const orb_trials *t, const orb_trial *one, int s, int32
   const orb_mesh *mesh = &t->copy[s].mesh, *other = &t->copy[1 - s].mesh;
   for (int32_t u = 0; u < other->vertex_count; u++) {
     double least = INFINITY;
+    out[u] = 0;
     for (int32_t v = 0; v < mesh->vertex_count; v++) {
       const double d = orb_distance2(one->pose[s].position + 3 * (size_t)v, other->positions + 3 * (size_t)u);
       out[u] = d < least ? v : out[u];
@@ -26,6 +28,7 @@ static orb_status cross(orb_context *ctx, void *arg, int32_t i) {
   if (!(one->cost < INFINITY)) {
     return ORB_OK; /* it was dropped */
   }
+  ORB_GO(status, orb_context_check(ctx), end);
   ORB_GO(status, orb_trial_create(ctx, t, &crossed), end);
   for (int s = 0; s < 2; s++) {
     fill_inverse(t, one, 1 - s, crossed.own[s]);

@@ -35,8 +35,6 @@ static orb_status extend(orb_context *ctx, const orb_trials *t, orb_agreed *agre
   }
   ORB_TRY(orb_trial_register(ctx, t, one, 0));
   ORB_TRY(orb_trial_register(ctx, t, one, 1));
-  orb_trial_fill_cost(t, one, 1);
-  one->rough = one->cost;
   orb_trial_fill_cost(t, one, 2);
   return ORB_OK;
 }

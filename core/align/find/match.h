@@ -10,6 +10,8 @@
  *   agreed.h, extended.h
  *             rough maps that follow from the part on which a trial agrees with its way back
  *   crossed.h registrations along the way back of the other direction
+ *   symmetry.h, mirrored.h
+ *             the mirror symmetries of the copies, and trials that keep them
  *   raised.h  the best trials, on finer copies
  *   match.h   the best of them, its pairs and its targets
  *   found.h   the landmarks that an alignment found, and their confidence
@@ -23,7 +25,8 @@
  * and right swapped with front and back) bends them more, and often also rotates them in space.
  *
  * All maps are tried on small copies, where a registration takes 3 ms; where shapes bend much, all are extended and
- * crossed there. The best few are registered again on copies three times as fine, and ranked.
+ * crossed there, and the best are mirrored. The best few are registered again on copies three times as fine, and
+ * ranked. Bodies in poses, which bend little, get maps made on these finer copies as well.
  *
  * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on
  * the course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by
@@ -55,10 +58,12 @@ typedef struct orb_match {
   int is_found;  /* 0: a shape has too few vertices, or no map was found; only is_unsure is filled then */
   int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
   double bend;   /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
-  double cost;   /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space */
+  double cost;   /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space, times 1 +
+                    ORB_FIND_ASYMMETRY_COST for each unit of its asymmetry (mirrored.h) */
   double clear;  /* 0 to 1: how far the next best map that differs is behind */
   double lead;   /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
-                    half of the cost of the rotation in space. About 1 if a shape looks alike from several sides */
+                    half of the cost of the rotation in space and of the asymmetry. About 1 if a shape looks alike from
+                    several sides */
   int moves; /* which shape moves where only one does: the second (1), unless the first (0) is clearly less round. Limbs
                 that move stretch to where they go; limbs that stay are left out by the triangles of a round shape */
   orb_match_pairs pairs;
@@ -78,8 +83,9 @@ ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
  * other[n − 1]. moving: 0, the first shape, or 1, the second, which alone is drawn to landmarks. *target: the caller's
  * to free, also on failure; NULL if a degenerate shape cannot be registered back, which the best map excludes. The
- * meshes of the match must still exist. Targets of different n may be computed side by side: each completes its own
- * trial. About 0.1 s of one thread. */
+ * meshes of the match must still exist. Targets of different n may be computed side by side, since each completes its
+ * own trial; so may both targets of n 0 without landmarks, since the best trial is complete. About 0.1 s of one thread.
+ */
 ORB_MUST_CHECK orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving,
                                            double **target);
 /* Makes other[k] the best map; the former best map becomes the first of the others. target: NULL, or that of other[k];

@@ -31,10 +31,11 @@ static double off_of(const orb_trials *t, const images *m, int s, const int32_t 
   return sum;
 }
 
-/* Fills m for where the vertices of small copies lie under a trial. Free it in any case. */
-static orb_status images_create(orb_context *ctx, const orb_trials *small, const double *const position[2], images *m) {
+/* Fills m for where the vertices of small copies lie under a trial, in one direction or both. Free it in any case. */
+static orb_status images_create(orb_context *ctx, const orb_trials *small, const double *const position[2],
+                                int directions, images *m) {
   *m = (images){.ctx = ctx, .asymmetry = INFINITY};
-  for (int s = 0; s < 2; s++) {
+  for (int s = 0; s < directions; s++) {
     const int32_t n = small->copy[s].mesh.vertex_count;
     m->of[s] = ORB_NEW(ctx, int32_t, n);
     if (!m->of[s]) {
@@ -45,7 +46,10 @@ static orb_status images_create(orb_context *ctx, const orb_trials *small, const
   for (int i = 0; i < small->symmetry[0].count; i++) {
     for (int k = 0; k < small->symmetry[1].count; k++) {
       const int32_t *first = small->symmetry[0].image[i], *second = small->symmetry[1].image[k];
-      const double off = (off_of(small, m, 0, first, second) + off_of(small, m, 1, second, first)) / 2;
+      double off = off_of(small, m, 0, first, second);
+      if (directions == 2) {
+        off = (off + off_of(small, m, 1, second, first)) / 2;
+      }
       if (off < m->asymmetry) {
         m->asymmetry = off;
         m->mirror[0] = first;
@@ -58,14 +62,12 @@ static orb_status images_create(orb_context *ctx, const orb_trials *small, const
 
 /* Sets the asymmetry of a trial of t by where it takes the vertices of small copies, and its costs. */
 static orb_status weigh_trial(orb_context *ctx, const orb_trials *small, const double *const position[2],
-                              const orb_trials *t, orb_trial *one) {
+                              int directions, const orb_trials *t, orb_trial *one) {
   images m;
   orb_status status;
-  ORB_GO(status, images_create(ctx, small, position, &m), end);
+  ORB_GO(status, images_create(ctx, small, position, directions, &m), end);
   one->asymmetry = m.asymmetry;
-  orb_trial_fill_cost(t, one, 1);
-  one->rough = one->cost;
-  orb_trial_fill_cost(t, one, 2);
+  orb_trial_fill_cost(t, one, directions);
 end:
   images_free(&m);
   return status;
@@ -82,10 +84,11 @@ static orb_status weigh(orb_context *ctx, void *arg, int32_t i) {
   orb_trial *one = &all->t->trial[i];
   double *position[2] = {NULL, NULL};
   orb_status status = ORB_OK;
-  if (!(one->cost < INFINITY)) {
-    return ORB_OK; /* it was dropped */
+  const int is_dropped = !(one->cost < INFINITY), directions = is_dropped ? 1 : 2;
+  if (!(one->rough < INFINITY)) {
+    return ORB_OK; /* its poses may not be set */
   }
-  for (int s = 0; s < 2; s++) {
+  for (int s = 0; s < directions; s++) {
     const orb_coarse_copy *copy = &all->small->copy[s];
     position[s] = ORB_NEW(ctx, double, 3 * (size_t)copy->mesh.vertex_count);
     if (!position[s]) {
@@ -98,7 +101,8 @@ static orb_status weigh(orb_context *ctx, void *arg, int32_t i) {
     }
   }
   const double *const held[2] = {position[0], position[1]};
-  status = weigh_trial(ctx, all->small, held, all->t, one);
+  status = weigh_trial(ctx, all->small, held, directions, all->t, one);
+  one->cost = is_dropped ? INFINITY : one->cost;
 end:
   orb_free(ctx, position[0]);
   orb_free(ctx, position[1]);
@@ -167,7 +171,7 @@ static orb_status mirror(orb_context *ctx, const orb_trials *t, const orb_trial 
   int extended;
   orb_status status;
   const double *const before[2] = {from->pose[0].position, from->pose[1].position};
-  ORB_GO(status, images_create(ctx, t, before, &m), end);
+  ORB_GO(status, images_create(ctx, t, before, 2, &m), end);
   ORB_GO(status, orb_agreed_create(ctx, mesh, survey, &agreed), end);
   ORB_GO(status, orb_trial_create(ctx, t, out), end);
   fill_maps(t, &m, side, out);
@@ -175,7 +179,7 @@ static orb_status mirror(orb_context *ctx, const orb_trials *t, const orb_trial 
   ORB_GO(status, orb_agreed_extend(ctx, &agreed, position, 1, out->own[0], out->own[1], &extended), end);
   ORB_GO(status, orb_trial_register(ctx, t, out, 0), end);
   ORB_GO(status, orb_trial_register(ctx, t, out, 1), end);
-  status = weigh_trial(ctx, t, position, t, out);
+  status = weigh_trial(ctx, t, position, 2, t, out);
 end:
   images_free(&m);
   orb_agreed_free(ctx, &agreed);

@@ -10,9 +10,9 @@
 
 #include "align/find/trials.h"
 
-/* Sets the asymmetry of all trials of `trials` that are not dropped, and their costs by both directions. They are
- * trials of the small copies, or of the coarse ones that these were made of. Nothing happens if a small copy has no
- * symmetry. O(n) a trial. */
+/* Sets the asymmetry of all trials of `trials`, and their costs: by both directions, or by the first one of those that
+ * were dropped. They are trials of the small copies, or of the coarse ones that these were made of. Nothing happens if
+ * a small copy has no symmetry. O(n) a trial. */
 ORB_MUST_CHECK orb_status orb_trials_weigh_asymmetry(const orb_trials *small, orb_trials *trials);
 
 /* Mirrors the best trials that differ, each from one side to the other and the reverse, extends and registers what

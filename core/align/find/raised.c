@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/context.h"
 #include "base/tasks.h"
 #include "elastic/carry.h"
 
@@ -29,20 +30,17 @@ static orb_status raise_one(orb_context *ctx, void *arg, int32_t i) {
   if (!(from->cost < INFINITY)) { /* it was dropped before its way back was registered */
     ORB_TRY(orb_trials_complete(ctx, all->small, all->list[i]));
   }
+  ORB_TRY(orb_context_check(ctx));
   ORB_TRY(orb_trial_create(ctx, all->coarse, out));
   ORB_TRY(map_vertices(ctx, all, from, 0, out));
   ORB_TRY(map_vertices(ctx, all, from, 1, out));
   out->cost = out->rough = 0;
-  out->asymmetry = from->asymmetry;
   return ORB_OK;
 }
 
 orb_status orb_trials_raise(orb_trials *small, orb_trials *coarse) {
   raising all = {.small = small, .coarse = coarse};
-  int32_t count = orb_trials_differing(small, ORB_FIND_RAISED_APART, ORB_FIND_RAISED, all.list);
-  if (count > 0 && !(small->trial[all.list[0]].rough < INFINITY)) {
-    count = 0; /* landmarks contradict all of them */
-  }
+  const int32_t count = orb_trials_differing(small, ORB_FIND_RAISED_APART, ORB_FIND_RAISED, all.list);
   ORB_TRY(orb_trials_survey(coarse, 0));
   coarse->count = count; /* before they are made, so that orb_trials_close() frees them */
   return orb_tasks_run(coarse->ctx, count, raise_one, &all);

@@ -1,6 +1,7 @@
 #include "align/find/symmetry.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -56,16 +57,47 @@ static void mirroring_free(mirroring *m) {
   }
 }
 
-/* Registers the mirror image along candidate i. */
+static int compare(const void *x, const void *y) {
+  const double a = *(const double *)x, b = *(const double *)y;
+  return (a > b) - (a < b);
+}
+
+/* How much a map of the mesh to itself changes the distances along it: of the vertices, the median of their mean
+ * differences, over the mean distance. */
+static orb_status measure_stretch(const mirroring *m, const int32_t *image, double *stretch) {
+  const int32_t n = m->mesh->vertex_count;
+  double sum = 0, *off = ORB_NEW0(m->ctx, double, n);
+  if (!off) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < n; v++) {
+    for (int32_t u = 0; u < n; u++) {
+      const double apart = orb_survey_apart(m->survey, m->mesh, v, u);
+      off[v] += fabs(apart - orb_survey_apart(m->survey, m->mesh, image[v], image[u]));
+      sum += apart;
+    }
+  }
+  qsort(off, (size_t)n, sizeof *off, compare);
+  *stretch = sum > 0 ? off[n / 2] * n / sum : INFINITY;
+  orb_free(m->ctx, off);
+  return ORB_OK;
+}
+
+/* Registers the mirror image along candidate i. One that does not keep distances gets an infinite bend. */
 static orb_status try_candidate(mirroring *m, int32_t i) {
   const size_t n = (size_t)m->mesh->vertex_count;
   const orb_rough_map map = {m->dense.forth + (size_t)i * n, m->dense.back + (size_t)i * n};
+  double stretch;
   m->image[i] = ORB_NEW(m->ctx, int32_t, n);
   if (!m->image[i]) {
     return ORB_E_NO_MEMORY;
   }
   ORB_TRY(orb_elastic_register(m->ctx, &m->mirrored, m->mesh, &m->survey->around, &map, NULL, &m->pose, &m->bend[i]));
   orb_survey_images(m->survey, m->mesh, m->pose.position, m->mesh->vertex_count, m->image[i]);
+  ORB_TRY(measure_stretch(m, m->image[i], &stretch));
+  if (!(stretch <= ORB_FIND_SYMMETRIC_STRETCH)) {
+    m->bend[i] = INFINITY;
+  }
   return orb_context_check(m->ctx);
 }
 
@@ -83,7 +115,6 @@ static void take_best(mirroring *m, int32_t count, orb_symmetry *out) {
     if (out->count == 0) {
       most = fmin(most, ORB_FIND_SYMMETRIC_BEHIND * m->bend[best]);
     }
-    out->bend[out->count] = m->bend[best];
     out->image[out->count++] = m->image[best];
     m->image[best] = NULL;
   }

@@ -17,7 +17,6 @@
 typedef struct orb_symmetry {
   int32_t count;                       /* 0: the shape has none */
   int32_t *image[ORB_FIND_SYMMETRIES]; /* of each vertex; the symmetry that bends least first */
-  double bend[ORB_FIND_SYMMETRIES];
 } orb_symmetry;
 
 /* survey and shape: of the same mesh, with distances. Free `out` in any case. O(n²) for n vertices: about 0.05 s of one

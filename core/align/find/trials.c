@@ -202,6 +202,7 @@ static void carried_map(const orb_trials *t, const orb_tips *const tips[2], cons
   const orb_coarse_copy *from = &t->copy[s], *to = &t->copy[1 - s];
   for (int32_t v = 0; v < from->mesh.vertex_count; v++) {
     double p[3], best = -INFINITY;
+    out[v] = 0;
     orb_tip_match_carry(tips, match, s, from->points + 3 * (size_t)v, p);
     for (int32_t u = 0; u < to->mesh.vertex_count; u++) {
       const double near = orb_dot(p, to->points + 3 * (size_t)u);
@@ -321,18 +322,23 @@ void orb_trial_images(const orb_trials *t, const orb_trial *one, int s, int32_t 
 }
 
 void orb_trial_fill_cost(const orb_trials *t, orb_trial *one, int directions) {
-  double bend = 0;
-  for (int s = 0; s < directions; s++) {
-    bend += one->bend[s] / directions;
-  }
-  one->cost =
-      bend * (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0)) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
+  const double factor =
+      (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0)) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
+  const double bend = directions == 2 ? (one->bend[0] + one->bend[1]) / 2 : one->bend[0];
+  const int is_known = isfinite(one->bend[0] * factor) && isfinite(bend * factor);
+  one->rough = is_known ? one->bend[0] * factor : INFINITY;
+  one->cost = is_known ? bend * factor : INFINITY;
+}
+
+/* Dropped trials come last, by their rough cost. */
+static int is_before(const orb_trial *x, const orb_trial *y) {
+  return x->cost < INFINITY || y->cost < INFINITY ? x->cost < y->cost : x->rough < y->rough;
 }
 
 int32_t orb_trials_best(const orb_trials *t) {
   int32_t best = 0;
   for (int32_t i = 1; i < t->count; i++) {
-    best = t->trial[i].cost < t->trial[best].cost ? i : best;
+    best = is_before(&t->trial[i], &t->trial[best]) ? i : best;
   }
   return best;
 }
@@ -407,7 +413,6 @@ orb_status orb_trials_rank(orb_trials *t) {
   const double most = ORB_FIND_BEHIND * t->trial[orb_trials_best(t)].cost;
   for (int32_t i = 0; i < t->count; i++) {
     orb_trial *one = &t->trial[i];
-    one->rough = one->cost < INFINITY ? one->cost : one->rough;
     one->cost = one->cost > most ? INFINITY : one->cost;
   }
   ORB_TRY(register_all(t, 1));
@@ -440,13 +445,9 @@ static int is_different(const orb_trials *t, const orb_trial *one, double apart,
   return 1;
 }
 
-/* Dropped trials come last, by their rough cost. */
-static int is_before(const orb_trial *x, const orb_trial *y) {
-  return x->cost < INFINITY || y->cost < INFINITY ? x->cost < y->cost : x->rough < y->rough;
-}
-
 int32_t orb_trials_differing(const orb_trials *t, double apart, int32_t most, int32_t *list) {
   int32_t count = 0, next = orb_trials_best(t);
+  next = t->count > 0 && t->trial[next].rough < INFINITY ? next : -1;
   while (next >= 0 && count < most) {
     list[count++] = next;
     next = -1;

@@ -3,8 +3,9 @@
  * In: two meshes, and perhaps places of landmarks on their copies. Out: the trials with their poses and costs, and the
  * best of those that differ. match.h describes the method and writes the result.
  *
- * The time of a trial grows with the square of the vertices. So all trials are made and registered on small copies, and
- * the best of them are raised to coarse ones, where they are ranked again (raised.h). */
+ * The time of a trial grows with the square of the vertices. So trials are made and registered on small copies, and the
+ * best of them are raised to coarse ones, where they are ranked again (raised.h). Where shapes bend little, trials are
+ * made of the coarse copies too. */
 #ifndef ORB_ALIGN_FIND_TRIALS_H
 #define ORB_ALIGN_FIND_TRIALS_H
 
@@ -26,7 +27,7 @@ typedef struct orb_trial {
   double bend[2];
   double rough;     /* cost in the first direction alone */
   double asymmetry; /* see mirrored.h; 0: not known */
-  int32_t *own[2];  /* the rough map, if it is an extended or a raised one; else NULL */
+  int32_t *own[2];  /* the rough map, if it is neither spectral nor a rotation; else NULL */
   double cost; /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
                   INFINITY as  well, its poses may not be set */
 } orb_trial;
@@ -48,7 +49,7 @@ typedef struct orb_trials {
                                      orb_trials_refine() */
   int32_t fine_size;              /* vertices of these */
   orb_hint_places hint;           /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
-  orb_spectral_dense dense;       /* of small copies */
+  orb_spectral_dense dense;       /* the spectral maps */
   int32_t *rotated[2];            /* the maps of the rotations, one after the other, laid out as in `dense` */
   orb_trial trial[ORB_TRIALS_MAX];
   int32_t count;
