@@ -2,11 +2,11 @@
 """Measures maps against dense truth, and writes docs/bench-correspond.md.
 
     tests/bench/correspond.py [--bin build/bin] [--base DIR-OR-REVISION] [--set people,animals,real] [--half choose|report|all]
-                              [--seed N] [--given 0,8] [--preset default] [--change none,swapped,turned,refined] [--sample K] [--pairs A-B,…] [--jobs 1]
+                              [--seeds N,…] [--given 0,8] [--preset default] [--change none,swapped,turned,refined] [--sample K] [--pairs A-B,…] [--jobs 1]
                               [--store DIR] [--fresh] [--out FILE.md] [--json FILE.json]
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
-docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds that a seed draws. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half that is
+docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half that is
 only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
@@ -260,7 +260,7 @@ def list_pairs(options):
     meshes, wanted = pathlib.Path(options.meshes), options.set.split(",")
     sets = {"people": correspond_pairs.posed(meshes),
             "animals": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store),
-            "drawn": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, options.seed),
+            "drawn": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, map(int, options.seeds.split(","))),
             "real": correspond_pairs.real(meshes, surface_of)}
     unknown = set(wanted) - set(sets)
     if unknown:
@@ -284,7 +284,7 @@ def main():
     parser.add_argument("--base", help="a folder of programs, or a revision")
     parser.add_argument("--meshes", default=ROOT / "../shared/meshes")
     parser.add_argument("--set", default="people,animals,real")
-    parser.add_argument("--seed", type=int, default=17, help="of the set `drawn`")
+    parser.add_argument("--seeds", default="17,19", help="of the set `drawn`, with commas")
     parser.add_argument("--half", choices=("choose", "report", "all"), default="all")
     parser.add_argument("--given", default="0", help="numbers with commas")
     parser.add_argument("--preset", choices=("fast", "default", "quality"), default="default")

@@ -89,7 +89,7 @@ def posed(meshes):
         yield from folder_pairs("people", meshes / "posed", listed(meshes / "posed"), lambda i, _: ("choose", "report")[i % 2])
 
 
-def animals(program, store, seed=None):
+def animals(program, store, seeds=()):
     """Generated animals, in a folder for each build of the program: the pairs that it lists, or drawn ones. A body is
     written when it is first needed."""
     if not program.exists():
@@ -108,11 +108,11 @@ def animals(program, store, seed=None):
                 for file in (f"{stem}.truth.csv", name):  # the body last: it stands for both
                     pathlib.Path(made, file).rename(folder / file)
 
-    if seed is None:
+    if not seeds:
         yield from folder_pairs("animals", folder, listed(folder), lambda _, title: half_of(title), make)
-    else:
+    for seed in seeds:
         half = "choose" if seed in CHOSEN_ON else "report"
-        yield from folder_pairs("drawn", folder, drawn(seed), lambda *_: half, make)
+        yield from folder_pairs(f"drawn {seed}", folder, drawn(seed), lambda *_, half=half: half, make)
 
 
 def vertex_place(surface, v, of):

@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 
+#include "align/find/contest.h"
 #include "align/find/match.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
@@ -30,11 +31,14 @@ static orb_mesh read_sample(orb_context *ctx, const char *name) {
 }
 
 /* The neck of a giraffe is four times as long as that of a dog, so its targets fold, and no start from them leads to a
- * map. A walk does: its energy is that of shapes that correspond. */
+ * map. A walk does, of one shape or the other: its energy is that of shapes that correspond. One walk alone is not sure
+ * to: of eight of the giraffe's towards meshes that differ in the tenth digit, seven come to 1.34 to 1.73, one to 1.81.
+ */
 static void dog_to_giraffe(void **state) {
   (void)state;
   orb_context *ctx;
   orb_match match;
+  orb_contest_result won;
   orb_alignment alignment;
   orb_mesh mesh[2];
   orb_embedding embedding[2];
@@ -56,10 +60,8 @@ static void dog_to_giraffe(void **state) {
   assert_int_equal(orb_align(ctx, even.shapes, 2, NULL, 0, &options, &alignment), ORB_OK);
   orb_even_shapes_free(ctx, &even);
   assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, 1, &match), ORB_OK);
-  assert_int_equal(orb_match_target(ctx, &match, 0, 1, &match.target), ORB_OK);
-  const double *targets[2] = {NULL, match.target};
-  const orb_aims aims = {.targets = targets, .keep_angles = 1, .walks_first = 1};
-  assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_SPACE, &aims, ORB_PRESET_DEFAULT), ORB_OK);
+  assert_int_equal(orb_contest_run(ctx, &match, ORB_PRESET_DEFAULT, &alignment, &won), ORB_OK);
+  assert_false(won.is_space);
   assert_true(alignment.energy <= orb_map_params_of(ORB_PRESET_DEFAULT).energy.poor);
   check_alignment(&alignment, 0);
   orb_alignment_free(ctx, &alignment);
