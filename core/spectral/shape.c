@@ -231,18 +231,15 @@ orb_status orb_spectral_shape_create(orb_context *ctx, const orb_mesh *mesh, int
   }
   work_free(&w);
   if (mirrored) {
-    orb_spectral_shape_mirror(out, out);
+    orb_spectral_shape_mirror(out);
   }
   return status;
 }
 
-void orb_spectral_shape_mirror(const orb_spectral_shape *shape, orb_spectral_shape *out) {
-  if (out != shape) {
-    *out = *shape;
-  }
+void orb_spectral_shape_mirror(orb_spectral_shape *shape) {
   for (int at = 0; at < ORB_SPECTRAL_TRIPLES; at++) {
     for (int s = 0; s < ORB_SPECTRAL_SAMPLES; s++) {
-      out->triple[at][s] = -out->triple[at][s];
+      shape->triple[at][s] = -shape->triple[at][s];
     }
   }
 }

@@ -36,8 +36,9 @@ static inline int32_t orb_spectral_samples(int detail) {
 /* Free `out` in any case; the mesh must outlive it. mirrored: as if the surface were its mirror image. */
 ORB_MUST_CHECK orb_status orb_spectral_shape_create(orb_context *ctx, const orb_mesh *mesh, int mirrored,
                                                     orb_spectral_shape *out);
-/* The same shape as if its surface were its mirror image. It borrows what `shape` holds: do not free it. */
-void orb_spectral_shape_mirror(const orb_spectral_shape *shape, orb_spectral_shape *out);
+/* Makes a shape as if its surface were its mirror image. A copy of the struct borrows what the shape holds, but has
+ * orientations of its own, so it may be mirrored alone. */
+void orb_spectral_shape_mirror(orb_spectral_shape *shape);
 void orb_spectral_shape_free(orb_context *ctx, orb_spectral_shape *shape);
 
 #endif

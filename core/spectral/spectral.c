@@ -259,7 +259,8 @@ orb_status orb_spectral_find_mirror(orb_context *ctx, const orb_spectral_shape *
   if (!mirrored) {
     return ORB_E_NO_MEMORY;
   }
-  orb_spectral_shape_mirror(shape, mirrored);
+  *mirrored = *shape;
+  orb_spectral_shape_mirror(mirrored);
   const orb_status status = find(ctx, shape, mirrored, SIGNS, most, out, dense);
   orb_free(ctx, mirrored);
   return status;

@@ -9,7 +9,7 @@ import random
 import subprocess
 import tempfile
 
-CHOSEN_ON = (11, 13)  # seeds of drawn pairs
+CHOSEN_ON = (11, 13, 17, 19)  # seeds of drawn pairs
 PLACES = 250  # measured a pair; with four targets each and 24 landmarks these are the 1,024 landmarks of a request
 
 
@@ -64,8 +64,8 @@ def listed(folder):
 
 def drawn(seed):
     """Four pairs of each two kinds of animals, in any poses, some slim or stout. Constants of the search without
-    landmarks were chosen on those of the seeds 11 and 13, and none on the others; seeds 17 and 19 share three pairs with
-    them."""
+    landmarks were chosen on those of the seeds 11 and 13, and one (ORB_FIND_SYMMETRIC_STRETCH) on those of 17 and 19; none on
+    others."""
     draw = random.Random(seed)
     kinds = "dog giraffe elephant horse cow cat person".split()
     poses = "stand run walk turn graze sit lift".split()

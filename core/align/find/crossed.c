@@ -50,5 +50,5 @@ end:
 }
 
 orb_status orb_trials_cross(orb_trials *t) {
-  return orb_trials_bend(t) > ORB_FIND_EXTENDS ? orb_tasks_run(t->ctx, t->count, cross, t) : ORB_OK;
+  return orb_trials_bend_much(t) ? orb_tasks_run(t->ctx, t->count, cross, t) : ORB_OK;
 }

@@ -82,7 +82,7 @@ end:
 orb_status orb_trials_extend(orb_trials *t) {
   const orb_trial *best = &t->trial[orb_trials_best(t)];
   chains all = {.t = t};
-  if (!(orb_trials_bend(t) > ORB_FIND_EXTENDS)) {
+  if (!orb_trials_bend_much(t)) {
     return ORB_OK;
   }
   all.most = ORB_FIND_EXTENDS_BEHIND * best->cost;

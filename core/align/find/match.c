@@ -189,7 +189,7 @@ static int is_one_shape(const orb_trial *one, const orb_match_hint *hint, double
 
 /* Improves trials that bend small copies much, unless landmarks say which limb is which. */
 static orb_status improve_trials(orb_trials *small) {
-  if (small->hint.count > 0 || !(orb_trials_bend(small) > ORB_FIND_EXTENDS)) {
+  if (small->hint.count > 0 || !orb_trials_bend_much(small)) {
     return ORB_OK;
   }
   ORB_TRY(orb_trials_find_symmetries(small));

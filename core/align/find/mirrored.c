@@ -176,6 +176,7 @@ static orb_status mirror(orb_context *ctx, const orb_trials *t, const orb_trial 
   ORB_GO(status, orb_trial_create(ctx, t, out), end);
   fill_maps(t, &m, side, out);
   const double *const position[2] = {out->pose[0].position, out->pose[1].position};
+  /* where nothing is extended, the maps stay as filled */
   ORB_GO(status, orb_agreed_extend(ctx, &agreed, position, 1, out->own[0], out->own[1], &extended), end);
   ORB_GO(status, orb_trial_register(ctx, t, out, 0), end);
   ORB_GO(status, orb_trial_register(ctx, t, out, 1), end);

@@ -102,11 +102,11 @@ static orb_status try_candidate(mirroring *m, int32_t i) {
 }
 
 /* Moves the candidates that bend little to `out`, the best first. */
-static void take_best(mirroring *m, int32_t count, orb_symmetry *out) {
+static void take_best(mirroring *m, orb_symmetry *out) {
   double most = ORB_FIND_SYMMETRIC;
   while (out->count < ORB_FIND_SYMMETRIES) {
     int32_t best = -1;
-    for (int32_t i = 0; i < count; i++) {
+    for (int32_t i = 0; i < m->list.count; i++) {
       best = m->image[i] && m->bend[i] <= (best < 0 ? most : m->bend[best]) ? i : best;
     }
     if (best < 0) {
@@ -127,11 +127,10 @@ orb_status orb_symmetry_find(orb_context *ctx, const orb_survey *survey, const o
   *out = (orb_symmetry){0};
   ORB_GO(status, mirroring_create(ctx, shape->mesh, survey, &m), end);
   ORB_GO(status, orb_spectral_find_mirror(ctx, shape, ORB_FIND_MIRRORS, &m.list, &m.dense), end);
-  const int32_t count = m.list.count < ORB_FIND_MIRRORS ? m.list.count : (int32_t)ORB_FIND_MIRRORS;
-  for (int32_t i = 0; i < count; i++) {
+  for (int32_t i = 0; i < m.list.count; i++) {
     ORB_GO(status, try_candidate(&m, i), end);
   }
-  take_best(&m, count, out);
+  take_best(&m, out);
 end:
   mirroring_free(&m);
   return status;

@@ -141,7 +141,7 @@ static orb_status add_spectral(orb_trials *t) {
   orb_spectral_list list;
   ORB_TRY(orb_tasks_run(t->ctx, 2, make_spectral_shape, t));
   ORB_TRY(orb_spectral_find_dense(t->ctx, &t->spectral[0], &t->spectral[1], ORB_FIND_SPECTRAL, &list, &t->dense));
-  for (int32_t i = 0; i < list.count && i < ORB_FIND_SPECTRAL; i++) {
+  for (int32_t i = 0; i < list.count; i++) {
     if (list.candidate[i].cost <= list.candidate[0].cost + ORB_FIND_SPECTRAL_BEHIND) {
       ORB_TRY(add_trial(t, t->dense.forth + (size_t)i * (size_t)t->copy[0].mesh.vertex_count,
                         t->dense.back + (size_t)i * (size_t)t->copy[1].mesh.vertex_count));
@@ -346,6 +346,10 @@ int32_t orb_trials_best(const orb_trials *t) {
 double orb_trials_bend(const orb_trials *t) {
   const orb_trial *best = &t->trial[orb_trials_best(t)];
   return (best->bend[0] + best->bend[1]) / 2;
+}
+
+int orb_trials_bend_much(const orb_trials *t) {
+  return orb_trials_bend(t) > ORB_FIND_EXTENDS;
 }
 
 /* Drops the trials whose pose s takes the landmarks elsewhere. */

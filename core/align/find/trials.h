@@ -94,6 +94,9 @@ int32_t orb_trials_best(const orb_trials *trials);
 /* How much the best trial bends the shapes: the mean of both directions. */
 double orb_trials_bend(const orb_trials *trials);
 
+/* Whether that is more than ORB_FIND_EXTENDS, so that trials are improved. */
+int orb_trials_bend_much(const orb_trials *trials);
+
 /* Lists the best trial and, in order, those that take the first copy elsewhere than it and than each other by more than
  * a share of the diagonal, and that no landmarks contradict. list: room for `most`. Returns how many. */
 int32_t orb_trials_differing(const orb_trials *trials, double apart, int32_t most, int32_t *list);
