@@ -1,4 +1,4 @@
-/* The entry: checks the request and chooses between given/ and auto.c. */
+/* The entry: checks the request and chooses between given/ and auto/. */
 #include "orbmorph/align.h"
 
 #include <math.h>

@@ -252,6 +252,9 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;
   orb_trials_list(t);
   ORB_TRY(write_ranking(t, out));
+  if (!hint && walks && out->bend > ORB_FIND_INSET_BENDS) {
+    ORB_TRY(orb_inset_find(t, &out->inset));
+  }
   return orb_trials_refine(t, walks && out->bend > ORB_FIND_WALKS_FIRST ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
 }
 
@@ -285,6 +288,14 @@ orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, doubl
   match->clear = clear;
   match->lead = 1;
   return ORB_OK;
+}
+
+void orb_match_demote(orb_match *match) {
+  const int32_t kept = match->other_count < ORB_MATCH_OTHERS ? match->other_count : ORB_MATCH_OTHERS - 1;
+  memmove(match->other + 1, match->other, (size_t)kept * sizeof *match->other);
+  match->other[0] = (orb_match_other){.cost = 1, .pairs = match->pairs};
+  match->other_count = kept + 1;
+  match->lead = 1;
 }
 
 void orb_match_free(orb_context *ctx, orb_match *match) {

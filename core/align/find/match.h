@@ -14,6 +14,7 @@
  *             the mirror symmetries of the copies, and trials that keep them
  *   raised.h  the best trials, on finer copies
  *   match.h   the best of them, its pairs and its targets
+ *   inset/    whether one shape is a part of the other one (inset/inset.h)
  *   found.h   the landmarks that an alignment found, and their confidence
  *   contest.h which way leads to the better map
  *   params.h  all thresholds
@@ -35,6 +36,7 @@
 #define ORB_ALIGN_FIND_MATCH_H
 
 #include "align/find/hint.h"
+#include "align/find/inset/inset.h"
 
 enum {
   ORB_MATCH_PAIRS = 12, /* most pairs of a match */
@@ -69,8 +71,9 @@ typedef struct orb_match {
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  double *target;                          /* the caller's to set with orb_match_target(); freed with the match */
-  orb_trials *trials;                      /* the candidates, for the functions below */
+  orb_inset inset;    /* whether one shape is a part of the other one; only searched if `walks` and the shapes bend */
+  double *target;     /* the caller's to set with orb_match_target(); freed with the match */
+  orb_trials *trials; /* the candidates, for the functions below */
 } orb_match;
 
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
@@ -92,6 +95,9 @@ ORB_MUST_CHECK orb_status orb_match_target(orb_context *ctx, const orb_match *ma
  * the match takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that
  * decided. Sets lead to 1, because the bends contradict the choice. */
 ORB_MUST_CHECK orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear);
+/* Makes the best map the first of the others, because the map that was composed follows none of them. Sets lead to 1.
+ */
+void orb_match_demote(orb_match *match);
 /* The confidence in a match, 0 to 1, from its bend, its `clear`, its `lead` and the energy of the map that followed it:
  * calibrated from 0.8 on (docs/bench-confidence.md). */
 double orb_match_confidence(double bend, double clear, double lead, double energy);

@@ -1,7 +1,8 @@
 /* Alignment without landmarks.
  *
  * The shapes are embedded again, on spheres that keep angles. Every later shape is matched with the first one
- * (find/match.c), and the composed map goes to the targets of its match. Two shapes that bend much hold a contest
+ * (find/match.c), and the composed map goes to the targets of its match. If one of two shapes is a part of the other
+ * one, what lies on each other in space is held instead (find/inset/inset.h). Two shapes that bend much hold a contest
  * of the ways to make the map instead (find/contest.h). If the targets give no good map of two shapes, the next best
  * match is tried, and then what fits best in space. If they give none of more shapes, pairs of the matches are pinned
  * as landmarks, and the map is composed with the pairs held and then without them. The alignment of least energy is
@@ -86,66 +87,6 @@ static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, 
   return ORB_OK;
 }
 
-/* Has no mesh been split? */
-static int is_unsplit(const orb_align_shape *shapes, const orb_alignment *a) {
-  for (int32_t s = 0; s < a->shape_count; s++) {
-    if (a->shapes[s].mesh.vertex_count != shapes[s].mesh->vertex_count) {
-      return 0;
-    }
-  }
-  return 1;
-}
-
-/* Pins the shapes at the pairs of the matches, composes the map with the pairs held and then without them. *held 0: the
- * pairs cannot be met on the meshes as they are, and `out` is empty. */
-static orb_status align_pairs(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
-                              const orb_align_options *options, orb_alignment *out, int *held) {
-  orb_status status = ORB_E_NO_MEMORY;
-  orb_align_options pin = *options;
-  int32_t shape_count = m->shape_count;
-  orb_place *at = ORB_NEW(ctx, orb_place, (size_t)m->count * (size_t)shape_count);
-  orb_landmark landmarks[ORB_MATCH_PAIRS];
-  pin.method = ORB_ALIGN_PIN;
-  pin.max_growth = 1e-9; /* practically none: 0 would mean the default */
-  memset(out, 0, sizeof *out);
-  memset(landmarks, 0, sizeof landmarks);
-  *held = 0;
-  if (!at) {
-    goto end;
-  }
-  for (int32_t k = 0; k < m->count; k++) {
-    landmarks[k].at = at + (size_t)k * (size_t)shape_count;
-    for (int32_t s = 0; s < shape_count; s++) {
-      ORB_GO(status,
-             orb_place_of_vertex(ctx, shapes[s].mesh, m->vertex[(size_t)s * ORB_MATCH_PAIRS + (size_t)k],
-                                 &at[(size_t)k * (size_t)shape_count + (size_t)s]),
-             end);
-    }
-  }
-  status = orb_align_pinned(ctx, shapes, shape_count, landmarks, m->count, &pin, out);
-  if (status == ORB_E_BAD_LANDMARKS) {
-    orb_error_clear(ctx);
-    status = ORB_OK;
-    goto end;
-  }
-  if (status != ORB_OK || !is_unsplit(shapes, out)) {
-    goto end;
-  }
-  out->landmark_count = 0;
-  for (int32_t s = 0; s < shape_count; s++) {
-    orb_free(ctx, out->shapes[s].landmark_vertices);
-    out->shapes[s].landmark_vertices = NULL;
-  }
-  ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, options->preset), end);
-  *held = 1;
-end:
-  orb_free(ctx, at);
-  if (!*held) {
-    orb_alignment_free(ctx, out);
-  }
-  return status;
-}
-
 /* The next best match of two shapes, with its map. */
 typedef struct next_match {
   int is_open;
@@ -224,12 +165,13 @@ static orb_status next_take(orb_context *ctx, matches *m, double poor, next_matc
 /* If a match has led to no map, its pairs are pinned. */
 static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                            const orb_align_options *options, orb_alignment *alignment) {
+  const orb_held_pairs pairs = {m->vertex, ORB_MATCH_PAIRS, m->count};
   orb_alignment other;
   int held;
   if (m->count < LEAST_PAIRS || alignment->energy <= ORB_FIND_PINS_ABOVE) {
     return ORB_OK;
   }
-  ORB_TRY(align_pairs(ctx, shapes, m, options, &other, &held));
+  ORB_TRY(orb_align_held(ctx, shapes, m->shape_count, &pairs, 0, options, &other, &held));
   if (held) {
     orb_alignment_keep_better(ctx, alignment, &other);
   }
@@ -285,11 +227,36 @@ static orb_status aim(orb_context *ctx, matches *m) {
   return ORB_OK;
 }
 
+/* Aligns a part and its whole by the pairs that lie on each other in space. The match of the wholes becomes the first
+ * of the others, and counts as no clearer: no energy compares the two maps. *held 0: the pairs cannot be met, and
+ * nothing has changed. */
+static orb_status align_inset(orb_context *ctx, const orb_align_shape *shapes, matches *m,
+                              const orb_align_options *options, orb_alignment *alignment, int *held) {
+  const orb_inset *inset = &m->of[1].inset;
+  const orb_held_pairs pairs = {inset->vertex[0], ORB_FIND_INSET_PAIRS, inset->count};
+  orb_alignment other;
+  ORB_TRY(orb_align_held(ctx, shapes, 2, &pairs, 1, options, &other, held));
+  if (*held) {
+    orb_alignment_free(ctx, alignment);
+    *alignment = other;
+    orb_match_demote(&m->of[1]);
+    m->lead = m->of[1].lead;
+  }
+  return ORB_OK;
+}
+
 /* Composes a rotated alignment towards the matches. Two shapes that bend much hold a contest. If all others lead to no
  * good map, continues with the next best match of two shapes, or pins pairs of the matches of more. */
 static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, matches *m,
                                  const orb_align_options *options, orb_alignment *alignment) {
   const double poor = orb_map_params_of(options->preset).energy.poor;
+  if (m->shape_count == 2 && m->of[1].inset.count >= LEAST_PAIRS) {
+    int held;
+    ORB_TRY(align_inset(ctx, shapes, m, options, alignment, &held));
+    if (held) {
+      return ORB_OK;
+    }
+  }
   if (m->shape_count == 2 && orb_contest_is_open(&m->of[1], m->keep_angles)) {
     return hold_contest(ctx, m, options, alignment);
   }

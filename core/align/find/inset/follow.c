@@ -1,0 +1,176 @@
+#include "align/find/inset/follow.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "numeric/rotation.h"
+#include "numeric/vec3.h"
+
+/* A place of the small shape on the large one. */
+typedef struct tried {
+  orb_similarity at;
+  double score; /* mean weight of its closest points; 0: left */
+} tried;
+
+/* Weighted sums of closest points: Σ w, Σ w x, Σ w y, Σ w |x|² and Σ w y xᵀ, of samples x that go to y. */
+typedef struct sums {
+  double weight, from[3], to[3], square, covariance[9];
+} sums;
+
+static void add(sums *s, double weight, const double x[3], const double y[3]) {
+  s->weight += weight;
+  s->square += weight * orb_dot(x, x);
+  for (int i = 0; i < 3; i++) {
+    s->from[i] += weight * x[i];
+    s->to[i] += weight * y[i];
+    for (int j = 0; j < 3; j++) {
+      s->covariance[3 * i + j] += weight * y[i] * x[j];
+    }
+  }
+}
+
+/* The similarity of least squares. Returns 0 where the points leave it open. */
+static int solve(sums *s, orb_similarity *out) {
+  double rotation[9], trace = 0, moved[3];
+  for (int i = 0; i < 9; i++) {
+    s->covariance[i] -= s->to[i / 3] * s->from[i % 3] / s->weight;
+  }
+  const double square = s->square - orb_dot(s->from, s->from) / s->weight;
+  if (!(s->weight > 0) || !(square > 0) || !orb_nearest_rotation(s->covariance, rotation)) {
+    return 0;
+  }
+  for (int i = 0; i < 9; i++) {
+    trace += rotation[i] * s->covariance[i];
+  }
+  if (!(trace > 0)) {
+    return 0;
+  }
+  memcpy(out->rotation, rotation, sizeof rotation);
+  out->scale = trace / square;
+  orb_rotate_point(rotation, s->from, moved);
+  for (int k = 0; k < 3; k++) {
+    out->shift[k] = (s->to[k] - out->scale * moved[k]) / s->weight;
+  }
+  return 1;
+}
+
+/* Follows closest points once, with the first `count` samples. near: NULL, then feet on the planes of the grid take the
+ * part of the nearest places; or a place for each sample, see orb_inset_nearest(). moves 0: measures only. Returns the
+ * mean weight before, or 0 if there is no way on. */
+static double follow(const orb_inset_pair *c, int32_t count, double width, int moves, orb_place *near,
+                     orb_similarity *s) {
+  sums sum;
+  memset(&sum, 0, sizeof sum);
+  for (int32_t i = 0; i < count; i++) {
+    const orb_inset_sample *x = &c->sample[i];
+    double p[3], at[3], own[3], other[3];
+    orb_similarity_apply(s, x->position, p);
+    orb_rotate_point(s->rotation, x->normal, own);
+    const double off = near ? orb_inset_nearest(c->large, c->tree, p, &near[i], at, other)
+                            : orb_inset_grid_foot(c->grid, p, at, other);
+    const double facing = off < INFINITY ? orb_dot(own, other) : 0;
+    if (facing > 0) {
+      add(&sum, facing * exp(-off * off / (2 * width * width)), x->position, at);
+    }
+  }
+  const double score = sum.weight / count;
+  if (!moves) {
+    return score;
+  }
+  return solve(&sum, s) && s->scale > ORB_FIND_INSET_SMALLEST / 2 && s->scale < 1 ? score : 0;
+}
+
+/* How far two places of the part are apart. */
+static double apart(const orb_similarity *a, const orb_similarity *b) {
+  double trace = 0;
+  for (int i = 0; i < 9; i++) {
+    trace += a->rotation[i] * b->rotation[i];
+  }
+  return sqrt(orb_distance2(a->shift, b->shift)) / fmin(a->scale, b->scale) + acos(fmax(-1, fmin(1, (trace - 1) / 2)));
+}
+
+/* Moves the best places that differ to the front, at most `most`. Returns how many. */
+static int32_t take_best(tried *all, int32_t count, int32_t most) {
+  int32_t taken = 0;
+  while (taken < most) {
+    int32_t best = -1;
+    for (int32_t i = taken; i < count; i++) {
+      best = all[i].score > (best < 0 ? 0 : all[best].score) ? i : best;
+    }
+    if (best < 0) {
+      break;
+    }
+    int is_new = 1;
+    for (int32_t k = 0; k < taken && is_new; k++) {
+      is_new = apart(&all[k].at, &all[best].at) > ORB_FIND_INSET_SAME;
+    }
+    const tried one = all[best];
+    all[best] = is_new ? all[taken] : all[--count];
+    if (is_new) {
+      all[taken++] = one;
+    }
+  }
+  return taken;
+}
+
+/* Turns the best places about their middles. A head that lies at the right place at a wrong turn would stay there by
+ * closest points. Returns how many places there are then. */
+static int32_t turn_again(const orb_inset_pair *c, double width, tried *all, int32_t count) {
+  double turn[ORB_INSET_FINE_TURNS][9];
+  const int32_t of = take_best(all, count, ORB_FIND_INSET_TURNED);
+  orb_inset_fine_turns(turn);
+  count = of;
+  for (int32_t i = 0; i < of; i++) {
+    for (int t = 0; t < ORB_INSET_FINE_TURNS; t++) {
+      tried *one = &all[count++];
+      *one = all[i];
+      for (int k = 0; k < 9; k++) {
+        const double *row = all[i].at.rotation + k / 3 * 3, *column = turn[t] + k % 3;
+        one->at.rotation[k] = row[0] * column[0] + row[1] * column[3] + row[2] * column[6];
+      }
+      one->score = follow(c, ORB_INSET_LOOKUPS, width, 0, NULL, &one->at);
+    }
+  }
+  return count;
+}
+
+orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *c, const orb_similarity *start, int32_t count,
+                            orb_similarity *out, double *score) {
+  enum { ROOM = ORB_FIND_INSET_STARTS + ORB_FIND_INSET_TURNED * (1 + ORB_INSET_FINE_TURNS) };
+  orb_place near[ORB_FIND_INSET_SAMPLES];
+  orb_status status = ORB_OK;
+  tried *all = ORB_NEW(ctx, tried, ROOM);
+  *score = 0;
+  if (!all) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    all[i] = (tried){start[i], 1};
+  }
+  for (int n = 0; n < ORB_FIND_INSET_STAGES; n++) {
+    const orb_find_inset_stage *stage = &ORB_FIND_INSET_STAGE[n];
+    const int32_t samples = stage->samples < c->sample_count ? stage->samples : c->sample_count;
+    const int is_last = n + 1 == ORB_FIND_INSET_STAGES;
+    count = stage->turns ? turn_again(c, stage->width, all, count) : count;
+    count = n == 0 ? count : take_best(all, count, stage->places);
+    for (int32_t i = 0; i < count; i++) {
+      for (int32_t k = 0; k < samples && is_last; k++) {
+        near[k].triangle = -1;
+      }
+      for (int r = 0; r < stage->rounds && all[i].score > 0; r++) {
+        all[i].score = follow(c, samples, stage->width, 1, is_last ? near : NULL, &all[i].at);
+      }
+      ORB_GO(status, orb_context_check(ctx), end);
+    }
+  }
+  if (take_best(all, count, 1) == 1) {
+    *out = all[0].at;
+    *score = all[0].score;
+  }
+end:
+  orb_free(ctx, all);
+  return status;
+}

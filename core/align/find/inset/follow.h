@@ -1,0 +1,21 @@
+/* Lays a small shape onto a part of a large one by closest points, from many starts. */
+#ifndef ORB_ALIGN_FIND_INSET_FOLLOW_H
+#define ORB_ALIGN_FIND_INSET_FOLLOW_H
+
+#include "align/find/inset/starts.h"
+
+/* The samples are spread over the small shape, so that the first of them are as well. */
+typedef struct orb_inset_pair {
+  const orb_inset_sample *sample;
+  int32_t sample_count; /* at least ORB_INSET_LOOKUPS, at most ORB_FIND_INSET_SAMPLES */
+  const orb_mesh *large;
+  const orb_nearest *tree;    /* of `large` */
+  const orb_inset_grid *grid; /* likewise */
+} orb_inset_pair;
+
+/* Lets all starts follow closest points by the stages of ORB_FIND_INSET_STAGE. *score: how well the samples lie on the
+ * large shape at last, 0 to 1; 0: no start has led anywhere, and `out` is not set. */
+ORB_MUST_CHECK orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *pair, const orb_similarity *start,
+                                           int32_t count, orb_similarity *out, double *score);
+
+#endif

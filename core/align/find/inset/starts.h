@@ -1,0 +1,29 @@
+/* Where a small shape may lie in a large one: at which turns, sizes and nodes of a grid the two surfaces nearly meet.
+ * No sample is compared with a triangle, so a million similarities take a twentieth of a second. */
+#ifndef ORB_ALIGN_FIND_INSET_STARTS_H
+#define ORB_ALIGN_FIND_INSET_STARTS_H
+
+#include "align/find/inset/grid.h"
+#include "align/find/inset/similarity.h"
+
+enum {
+  ORB_INSET_LOOKUPS = 48, /* samples that are looked up: with 32, more heads come out turned */
+  ORB_INSET_TURNS = 60,   /* rotations that take a dodecahedron to itself: any rotation is within 45° of one of them */
+  ORB_INSET_FINE_TURNS = 5 * ORB_INSET_TURNS
+};
+
+/* A point of the small shape, around the middle of its box, and its unit normal. */
+typedef struct orb_inset_sample {
+  double position[3], normal[3];
+} orb_inset_sample;
+
+/* Writes ORB_INSET_FINE_TURNS rotations, all about as far from the next ones: ORB_INSET_TURNS of them, and each again
+ * after a rotation by 24° about each of the axes of a tetrahedron. */
+void orb_inset_fine_turns(double (*rotation)[9]);
+
+/* Finds the best node for each turn and each of ORB_FIND_INSET_SIZE, and writes the ORB_FIND_INSET_STARTS best of
+ * these, best first. sample: ORB_INSET_LOOKUPS of them. O(nodes · turns · sizes · samples). */
+ORB_MUST_CHECK orb_status orb_inset_starts(orb_context *ctx, const orb_inset_grid *grid, const orb_inset_sample *sample,
+                                           orb_similarity *start, int32_t *count);
+
+#endif
