@@ -268,6 +268,9 @@ static void write_match(const orb_match_facts *match, api_text *out) {
   api_json_member_number(out, "clear", match->clear);
   api_json_member_number(out, "lead", match->lead);
   api_json_member_number(out, "bend", match->bend);
+  if (match->is_part) {
+    api_json_member_bool(out, "part", 1);
+  }
   api_json_close(out, '}');
 }
 

@@ -6,6 +6,7 @@
 
 #include "align/find/found.h"
 #include "align/find/match.h"
+#include "align/find/params.h"
 #include "align/find/suspects.h"
 #include "align/map/engine/params.h"
 #include "align/map/rims/alone.h"
@@ -84,6 +85,25 @@ static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, 
              : orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
 }
 
+/* Lets whole shapes follow their copies. What is held for a part stays held. */
+static orb_status lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, orb_preset preset,
+                       orb_alignment *out, int *lifted) {
+  const orb_landmark held[ORB_FIND_INSET_PAIRS] = {0};
+  for (int32_t s = 1; out->match.is_part && s < out->shape_count; s++) {
+    orb_copied_shape *one = &copies->of[s];
+    int32_t *vertex = ORB_NEW(ctx, int32_t, out->landmark_count);
+    if (!vertex) {
+      return ORB_E_NO_MEMORY;
+    }
+    for (int32_t l = 0; l < out->landmark_count; l++) {
+      vertex[l] = one->copy.vertex[out->shapes[s].landmark_vertices[l]];
+    }
+    orb_free(ctx, one->whole.landmark_vertices);
+    one->whole.landmark_vertices = vertex;
+  }
+  return orb_align_lift(ctx, copies, out->match.is_part ? held : landmarks, preset, out, lifted);
+}
+
 /* Aligns copies of the later shapes, then lets the shapes follow. *lifted 0: the whole shapes must be aligned, because
  * the copies do not meet at the landmarks or are not certified, or a shape cannot follow its copy. `out` is then empty.
  */
@@ -100,7 +120,7 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
     status = align_shapes(ctx, copies.shapes, shape_count, copies.landmarks, landmark_count, options, out);
   }
   if (status == ORB_OK) {
-    status = orb_align_lift(ctx, &copies, landmarks, options->preset, out, lifted);
+    status = lift(ctx, &copies, landmarks, options->preset, out, lifted);
   }
   orb_copies_free(ctx, &copies);
   return orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;
@@ -111,12 +131,17 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
  */
 static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                            const orb_align_options *options, orb_alignment *out) {
+  if (out->match.is_part) {
+    orb_alignment_forget_landmarks(ctx, out);
+  }
   if (options->method != ORB_ALIGN_AUTO || out->landmark_count > 0 || out->shape_count == 1) {
     return orb_align_suspects(ctx, shapes, landmarks, options, out);
   }
   const double clear = out->match.clear;
   if (out->match.is_measured) {
-    out->match.confidence = orb_match_confidence(out->match.bend, clear, out->match.lead, out->energy);
+    out->match.confidence = out->match.is_part
+                                ? ORB_FIND_SURE_PART
+                                : orb_match_confidence(out->match.bend, clear, out->match.lead, out->energy);
   } else {
     memset(&out->match, 0, sizeof out->match);
   }
@@ -151,11 +176,7 @@ static orb_status align_by_rims(orb_context *ctx, const orb_map_params *params, 
     return ORB_OK;
   }
   ORB_TRY(status);
-  other->landmark_count = 0;
-  for (int32_t s = 0; s < 2; s++) {
-    orb_free(ctx, other->shapes[s].landmark_vertices);
-    other->shapes[s].landmark_vertices = NULL;
-  }
+  orb_alignment_forget_landmarks(ctx, other);
   return ORB_OK;
 }
 

@@ -16,9 +16,9 @@
  *   given/   method.c: one method with the given landmarks, and the composed maps of an alignment; by_landmarks.c: two
  *            ways to align by landmarks, of which the better one wins; given.c: one of these, then soft landmarks are
  *            released, and copies are extended to their shapes
- *   auto/    held.c: pairs of a match, held like landmarks; auto.c: method `auto`, the rotation search, composed
- * towards the matches of find/ align.c  orb_align(): checks the request, chooses between given/ and auto/, and aligns
- * copies of large shapes
+ *   auto/    auto.c: method `auto`, the rotation search, composed towards the matches of find/; held.c: pairs of a
+ *            match, held like landmarks
+ *   align.c  orb_align(): checks the request, chooses between given/ and auto/, and aligns copies of large shapes
  *
  * The main header of each folder says what comes in, what goes out, and in which order to read its files:
  * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, map/rims/rims.h, find/match.h.
@@ -57,9 +57,9 @@ typedef struct orb_held_pairs {
   int32_t stride, count;
 } orb_held_pairs;
 
-/* Aligns shapes by pairs of vertices, and composes their maps. for_good: the pairs are held like given landmarks, also
- * where they say that one shape is a part of the other; otherwise they are pinned, and let go once a map is found. No
- * mesh is split, and the alignment has no landmarks. *held 0: the pairs cannot be met, and `out` is empty. */
+/* Aligns shapes by pairs of vertices, and composes their maps. for_good: the pairs are held like given landmarks, and
+ * are the landmarks of the alignment until the caller forgets them; otherwise they are pinned, and let go once a map is
+ * found. No mesh is split. *held 0: the pairs cannot be met, and `out` is empty. */
 ORB_MUST_CHECK orb_status orb_align_held(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                          const orb_held_pairs *pairs, int for_good, const orb_align_options *options,
                                          orb_alignment *out, int *held);

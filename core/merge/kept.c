@@ -23,7 +23,7 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { VERSION = 6, BYTE_ORDER_MARK = 0x01020304 };
+enum { VERSION = 7, BYTE_ORDER_MARK = 0x01020304 };
 static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 
 /* A new member of the alignment must be written and read here, with a new VERSION. */
@@ -147,6 +147,7 @@ static void put_places(writer *w, const orb_place *places, size_t count) {
 static void put_match(writer *w, const orb_alignment *a) {
   put_integer(w, a->match.is_measured);
   if (a->match.is_measured) {
+    put_integer(w, a->match.is_part);
     put(w, &a->match.bend, sizeof a->match.bend);
     put(w, &a->match.clear, sizeof a->match.clear);
     put(w, &a->match.lead, sizeof a->match.lead);
@@ -379,6 +380,7 @@ static void take_places(reader *r, const orb_align_shape *shapes, size_t shape_c
 static orb_status take_match(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
   out->match.is_measured = take_integer(r, 0, 1);
   if (out->match.is_measured) {
+    out->match.is_part = take_integer(r, 0, 1);
     take(r, &out->match.bend, sizeof out->match.bend);
     take(r, &out->match.clear, sizeof out->match.clear);
     take(r, &out->match.lead, sizeof out->match.lead);

@@ -365,6 +365,7 @@ static void write_match(const orb_alignment *alignment, api_text *line) {
   api_json_member_number(line, "bend", alignment->match.bend);
   api_json_member_number(line, "clear", alignment->match.clear);
   api_json_member_number(line, "lead", alignment->match.lead);
+  api_json_member_bool(line, "part", alignment->match.is_part);
   api_json_member_number(line, "confidence", alignment->match.confidence);
   api_json_member_integer(line, "alternatives", alignment->alternative_count);
   api_json_close(line, '}');

@@ -6,7 +6,7 @@ import test from 'node:test';
 import { folder, run } from './support/cli.mjs';
 import { daemon, samples } from './support/daemon.mjs';
 import { morphOf } from './support/glb.mjs';
-import { ball, egg, obj } from './support/shapes.mjs';
+import { ball, egg, figure, obj } from './support/shapes.mjs';
 
 // A ball with three unlike knobs.
 const knobs = [
@@ -144,8 +144,10 @@ test('the client says where a match is not sure, and calls only given landmarks 
   const env = { ORBMORPH_SERVER: d.url };
   const at = await folder(t);
   const [out, md, marks] = ['morph.glb', 'report.md', 'landmarks.json'].map((name) => path.join(at, name));
+  const doll = path.join(at, 'doll.obj');
+  await writeFile(doll, obj(figure([1, 1, 1, 0], 0.9))); // it looks alike from the front and from behind
   const morph = async (...args) => {
-    const files = ['dog.obj', 'elephant.ply'].map((name) => path.join(samples, name));
+    const files = [path.join(samples, 'elephant.ply'), doll];
     const done = await run(['morph', ...files, '-o', out, '--report', md, '-t', '0.01', ...args], { env });
     assert.equal(done.code, 0, done.err);
     return done.out + (await readFile(md, 'utf8'));

@@ -34,6 +34,7 @@ typedef struct matches {
   const double **targets; /* likewise */
   int32_t count;          /* vertices of the first shape that all matches pair */
   int32_t *vertex;        /* these, and their partners: ORB_MATCH_PAIRS a shape */
+  int is_part;            /* one of two shapes is laid onto a part of the other one */
   double clear, lead;     /* least over the shapes */
   double bend;            /* most over the shapes */
   int are_found;          /* all of them */
@@ -228,19 +229,23 @@ static orb_status aim(orb_context *ctx, matches *m) {
 }
 
 /* Aligns a part and its whole by the pairs that lie on each other in space. The match of the wholes becomes the first
- * of the others, and counts as no clearer: no energy compares the two maps. *held 0: the pairs cannot be met, and
- * nothing has changed. */
+ * of the others: no energy compares the two maps. *held 0: the pairs cannot be met, or their map is bad, and nothing
+ * has changed. */
 static orb_status align_inset(orb_context *ctx, const orb_align_shape *shapes, matches *m,
                               const orb_align_options *options, orb_alignment *alignment, int *held) {
   const orb_inset *inset = &m->of[1].inset;
   const orb_held_pairs pairs = {inset->vertex[0], ORB_FIND_INSET_PAIRS, inset->count};
   orb_alignment other;
   ORB_TRY(orb_align_held(ctx, shapes, 2, &pairs, 1, options, &other, held));
+  if (*held && other.energy > ORB_FIND_PART_BAD) {
+    orb_alignment_free(ctx, &other);
+    *held = 0;
+  }
   if (*held) {
     orb_alignment_free(ctx, alignment);
     *alignment = other;
     orb_match_demote(&m->of[1]);
-    m->lead = m->of[1].lead;
+    m->is_part = 1;
   }
   return ORB_OK;
 }
@@ -389,6 +394,7 @@ static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shap
     return ORB_OK;
   }
   out->match.is_measured = 1;
+  out->match.is_part = m->is_part;
   out->match.bend = m->bend;
   out->match.lead = m->lead;
   return write_alternatives(ctx, shapes, m, out);

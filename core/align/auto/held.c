@@ -1,9 +1,9 @@
-/* Alignments in which pairs of vertices are held like landmarks, and then forgotten: no landmark was given. */
+/* Alignments in which pairs of vertices that a match has found are held like landmarks. */
 #include <string.h>
 
 #include "align/methods.h"
+#include "align/sheet/sheet.h"
 #include "base/check.h"
-#include "base/error.h"
 #include "base/memory.h"
 
 /* Has no mesh been split? */
@@ -14,14 +14,6 @@ static int is_unsplit(const orb_align_shape *shapes, const orb_alignment *a) {
     }
   }
   return 1;
-}
-
-static void forget_landmarks(orb_context *ctx, orb_alignment *a) {
-  a->landmark_count = 0;
-  for (int32_t s = 0; s < a->shape_count; s++) {
-    orb_free(ctx, a->shapes[s].landmark_vertices);
-    a->shapes[s].landmark_vertices = NULL;
-  }
 }
 
 /* at: room for a place a pair and shape. */
@@ -54,16 +46,15 @@ orb_status orb_align_held(orb_context *ctx, const orb_align_shape *shapes, int32
   ORB_GO(status, write_landmarks(ctx, shapes, shape_count, pairs, at, landmarks), end);
   status = for_good ? orb_align_by_landmarks(ctx, shapes, shape_count, landmarks, pairs->count, &pin, out)
                     : orb_align_pinned(ctx, shapes, shape_count, landmarks, pairs->count, &pin, out);
-  if (status == ORB_E_BAD_LANDMARKS) {
-    orb_error_clear(ctx);
+  if (orb_alignment_lacks_room(ctx, status)) {
     status = ORB_OK;
     goto end;
   }
   if (status != ORB_OK || !is_unsplit(shapes, out)) {
     goto end;
   }
-  forget_landmarks(ctx, out);
   if (!for_good) {
+    orb_alignment_forget_landmarks(ctx, out);
     ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, options->preset), end);
   }
   *held = 1;

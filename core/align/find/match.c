@@ -295,7 +295,6 @@ void orb_match_demote(orb_match *match) {
   memmove(match->other + 1, match->other, (size_t)kept * sizeof *match->other);
   match->other[0] = (orb_match_other){.cost = 1, .pairs = match->pairs};
   match->other_count = kept + 1;
-  match->lead = 1;
 }
 
 void orb_match_free(orb_context *ctx, orb_match *match) {

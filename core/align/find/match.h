@@ -95,8 +95,8 @@ ORB_MUST_CHECK orb_status orb_match_target(orb_context *ctx, const orb_match *ma
  * the match takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that
  * decided. Sets lead to 1, because the bends contradict the choice. */
 ORB_MUST_CHECK orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear);
-/* Makes the best map the first of the others, because the map that was composed follows none of them. Sets lead to 1.
- */
+/* Makes the best map the first of the others, because the map that was composed follows none of them. The match is then
+ * only to be described: its others no longer belong to its trials. */
 void orb_match_demote(orb_match *match);
 /* The confidence in a match, 0 to 1, from its bend, its `clear`, its `lead` and the energy of the map that followed it:
  * calibrated from 0.8 on (docs/bench-confidence.md). */

@@ -4,6 +4,7 @@
 
 #include "align/sheet/sheet.h"
 #include "base/error.h"
+#include "base/memory.h"
 
 void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   for (int32_t s = 0; alignment->shapes && s < alignment->shape_count; s++) {
@@ -37,4 +38,12 @@ void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignme
     *one = *other;
   }
   memset(other, 0, sizeof *other);
+}
+
+void orb_alignment_forget_landmarks(orb_context *ctx, orb_alignment *alignment) {
+  alignment->landmark_count = 0;
+  for (int32_t s = 0; s < alignment->shape_count; s++) {
+    orb_free(ctx, alignment->shapes[s].landmark_vertices);
+    alignment->shapes[s].landmark_vertices = NULL;
+  }
 }

@@ -51,7 +51,8 @@ typedef struct orb_aligned_shape {
 
 enum { ORB_FOUND_MAX = 12, ORB_ALTERNATIVES_MAX = 4, ORB_ALTERNATIVE_PAIRS = 12 };
 
-/* Another correspondence that the search without landmarks considered. It matches one later shape differently, and all
+/* Another correspondence that the search without landmarks considered. If the shapes are matched as a part and a whole,
+ * the first one is that of the wholes. It matches one later shape differently, and all
  * others as the best one does. To request it, give its places as landmarks. The search found these places, so they mark
  * the same features only roughly. */
 typedef struct orb_alternative {
@@ -69,13 +70,14 @@ typedef struct orb_alternative {
  * map. */
 typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
-  double bend;         /* of the best rough map: 0 for a rigid motion */
-  double clear;        /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
-  double lead;         /* how much the nearest other rough map bends the shapes, divided by the same for the best one;
-                          both count half of the rotation in space and of the asymmetry. About 1: the shapes do not decide which
-                          is right,         for example because one looks alike from several sides. At most 100 */
-  double confidence;   /* 0 to 1, with the mean energy; calibrated on two shapes and from 0.8 on
-                          (docs/bench-confidence.md) */
+  int32_t is_part; /* 1: one of two shapes is a part of the other one, as a head is of a bust, and is laid onto it. What
+                      follows, but for the confidence, is of the wholes */
+  double bend;     /* of the best rough map: 0 for a rigid motion */
+  double clear;    /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
+  double lead;     /* how much the nearest other rough map bends the shapes, divided by the same for the best one;
+                      both count half of the rotation in space and of the asymmetry. About 1: the shapes do not decide which
+                      is right,         for example because one looks alike from several sides. At most 100 */
+  double confidence; /* 0 to 1, with the mean energy; calibrated on two shapes (docs/bench-confidence.md) */
 } orb_match_facts;
 
 /* A given landmark that may be misplaced. When the optimiser releases it, it moves far from its given place. */

@@ -23,23 +23,24 @@ typedef struct sums {
 static void add(sums *s, double weight, const double x[3], const double y[3]) {
   s->weight += weight;
   s->square += weight * orb_dot(x, x);
-  for (int i = 0; i < 3; i++) {
-    s->from[i] += weight * x[i];
-    s->to[i] += weight * y[i];
-    for (int j = 0; j < 3; j++) {
-      s->covariance[3 * i + j] += weight * y[i] * x[j];
-    }
+  orb_add_outer(s->covariance, y, x, weight);
+  for (int k = 0; k < 3; k++) {
+    s->from[k] += weight * x[k];
+    s->to[k] += weight * y[k];
   }
 }
 
 /* The similarity of least squares. Returns 0 where the points leave it open. */
 static int solve(sums *s, orb_similarity *out) {
   double rotation[9], trace = 0, moved[3];
+  if (!(s->weight > 0)) {
+    return 0;
+  }
   for (int i = 0; i < 9; i++) {
     s->covariance[i] -= s->to[i / 3] * s->from[i % 3] / s->weight;
   }
   const double square = s->square - orb_dot(s->from, s->from) / s->weight;
-  if (!(s->weight > 0) || !(square > 0) || !orb_nearest_rotation(s->covariance, rotation)) {
+  if (!(square > 0) || !orb_nearest_rotation(s->covariance, rotation)) {
     return 0;
   }
   for (int i = 0; i < 9; i++) {
@@ -139,7 +140,7 @@ static int32_t turn_again(const orb_inset_pair *c, double width, tried *all, int
 
 orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *c, const orb_similarity *start, int32_t count,
                             orb_similarity *out, double *score) {
-  enum { ROOM = ORB_FIND_INSET_STARTS + ORB_FIND_INSET_TURNED * (1 + ORB_INSET_FINE_TURNS) };
+  enum { ROOM = ORB_INSET_STARTS + ORB_FIND_INSET_TURNED * (1 + ORB_INSET_FINE_TURNS) };
   orb_place near[ORB_FIND_INSET_SAMPLES];
   orb_status status = ORB_OK;
   tried *all = ORB_NEW(ctx, tried, ROOM);

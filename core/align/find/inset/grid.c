@@ -25,10 +25,7 @@ double orb_inset_nearest(const orb_mesh *mesh, const orb_nearest *tree, const do
   *near = place;
   const int32_t *v = mesh->triangles + 3 * (size_t)place.triangle;
   const double *x = mesh->positions;
-  double u[3], w[3];
-  orb_sub(x + 3 * (size_t)v[1], x + 3 * (size_t)v[0], u);
-  orb_sub(x + 3 * (size_t)v[2], x + 3 * (size_t)v[0], w);
-  orb_cross(u, w, normal);
+  orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], normal);
   orb_normalize(normal);
   orb_place_position(mesh, &place, at);
   return sqrt(distance2);

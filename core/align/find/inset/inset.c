@@ -121,14 +121,21 @@ end:
   return status;
 }
 
+/* Is a copy neither a point nor endless? */
+static int is_body(const orb_mesh *copy) {
+  orb_extent extent;
+  orb_mesh_extent(copy, &extent);
+  return extent.diagonal > 0 && extent.diagonal < ORB_FIND_INSET_LONGEST;
+}
+
 static orb_status look(orb_context *ctx, void *arg, int32_t i) {
   search *c = (search *)arg + i;
   orb_inset_sample sample[ORB_FIND_INSET_SAMPLES];
-  orb_similarity start[ORB_FIND_INSET_STARTS];
+  orb_similarity start[ORB_INSET_STARTS];
   double stray = 1;
   int32_t count;
   ORB_TRY(search_create(ctx, c->trials, c));
-  if (c->sample_count < ORB_INSET_LOOKUPS) {
+  if (c->sample_count < ORB_INSET_LOOKUPS || !is_body(c->part) || !is_body(c->whole)) {
     return ORB_OK;
   }
   for (int32_t k = 0; k < c->sample_count; k++) {

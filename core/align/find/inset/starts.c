@@ -13,12 +13,6 @@ typedef struct turned {
   float normal[ORB_INSET_LOOKUPS][3];
 } turned;
 
-typedef struct starts {
-  orb_similarity *start;
-  double score[ORB_FIND_INSET_STARTS];
-  int32_t count;
-} starts;
-
 /* The rotations that take a dodecahedron to itself, as unit quaternions: the cosines of half their angles come first.
  * Of each two opposite quaternions, which are one rotation, the one whose first number that is not 0 is positive. */
 static void list_quaternions(double out[ORB_INSET_TURNS][4]) {
@@ -83,27 +77,11 @@ static double look_up(const orb_inset_grid *g, const turned *samples, const int3
       const float facing = n[0] * node[4] + n[1] * node[5] + n[2] * node[6], near = 1 - node[0] * scale;
       sum += facing > 0 && near > 0 ? facing * near : 0;
     }
-    if (i == ORB_INSET_LOOKUPS / 4 && sum < (float)(ORB_FIND_INSET_BAD * i)) {
+    if (i + 1 == ORB_INSET_LOOKUPS / 4 && sum < (float)ORB_FIND_INSET_BAD * (float)(i + 1)) {
       return 0;
     }
   }
   return (double)sum / ORB_INSET_LOOKUPS;
-}
-
-/* Puts a start among the best ones. */
-static void keep(starts *s, const orb_similarity *one, double score) {
-  int32_t i = s->count;
-  if (i < ORB_FIND_INSET_STARTS) {
-    s->count++;
-  } else if (score <= s->score[--i]) {
-    return;
-  }
-  for (; i > 0 && s->score[i - 1] < score; i--) {
-    s->start[i] = s->start[i - 1];
-    s->score[i] = s->score[i - 1];
-  }
-  s->start[i] = *one;
-  s->score[i] = score;
 }
 
 static void turn_samples(const orb_inset_grid *g, const orb_inset_sample *sample, const orb_similarity *by,
@@ -119,8 +97,8 @@ static void turn_samples(const orb_inset_grid *g, const orb_inset_sample *sample
   }
 }
 
-/* The best place of one turn and one size, of every other node. Returns its score. */
-static double best_place(const orb_inset_grid *g, const orb_inset_sample *sample, orb_similarity *one) {
+/* Finds the best place of one turn and one size, of every other node. Returns 0 if there is none. */
+static int best_place(const orb_inset_grid *g, const orb_inset_sample *sample, orb_similarity *one) {
   turned by;
   double best = 0;
   int32_t at[3];
@@ -139,25 +117,23 @@ static double best_place(const orb_inset_grid *g, const orb_inset_sample *sample
       }
     }
   }
-  return best;
+  return best > 0;
 }
 
 orb_status orb_inset_starts(orb_context *ctx, const orb_inset_grid *grid, const orb_inset_sample *sample,
                             orb_similarity *start, int32_t *count) {
-  starts s = {.start = start};
   double turn[ORB_INSET_TURNS][4];
   list_quaternions(turn);
+  *count = 0;
   for (int i = 0; i < ORB_INSET_TURNS; i++) {
     for (int z = 0; z < ORB_FIND_INSET_SIZES; z++) {
       orb_similarity one = {.scale = ORB_FIND_INSET_SIZE[z]};
       rotation_of(turn[i], one.rotation);
-      const double score = best_place(grid, sample, &one);
-      if (score > 0) {
-        keep(&s, &one, score);
+      if (best_place(grid, sample, &one)) {
+        start[(*count)++] = one;
       }
     }
     ORB_TRY(orb_context_check(ctx));
   }
-  *count = s.count;
   return ORB_OK;
 }
