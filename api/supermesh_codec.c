@@ -249,8 +249,7 @@ static void write_suspects(const api_supermesh_request *request, const orb_align
   api_json_close(out, ']');
 }
 
-/* A match is sure from this confidence on. docs/bench-confidence.md says how often a sure match is right, and promises
- * nothing below. */
+/* A match is sure from this confidence on. docs/bench-confidence.md says how often a sure match is right. */
 static const double SURE = 0.8;
 
 /* Appends how reliable the correspondence is that was found; nothing if none was searched. */
@@ -274,8 +273,11 @@ static void write_match(const orb_match_facts *match, api_text *out) {
   api_json_close(out, '}');
 }
 
+/* The most confidence of a landmark that was found: 1 is that of given ones. */
+static const double FOUND_MOST = 0.99;
+
 /* The same request with the pairs of an alternative as landmarks, which the default method pins. Each landmark has the
- * confidence 1 / cost, since it was found, not given. */
+ * confidence 1 / cost, or FOUND_MOST if that is less, since it was found, not given. */
 static void write_alternative_request(const api_supermesh_request *request, const orb_alternative *alternative,
                                       api_place *spots, api_text *out) {
   api_landmark_spec items[ORB_ALTERNATIVE_PAIRS];
@@ -283,7 +285,7 @@ static void write_alternative_request(const api_supermesh_request *request, cons
   memset(items, 0, sizeof items);
   for (int32_t i = 0; i < alternative->count; i++) {
     snprintf(items[i].name, sizeof items[i].name, "pair %d", i + 1);
-    items[i].confidence = fmin(1, 1 / alternative->cost);
+    items[i].confidence = fmin(FOUND_MOST, 1 / alternative->cost);
     items[i].weight = 1;
   }
   changed.landmarks = (api_landmark_list){alternative->count, request->shape_count, items, spots};

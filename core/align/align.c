@@ -88,8 +88,11 @@ static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, 
 /* Lets whole shapes follow their copies. What is held for a part stays held. */
 static orb_status lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, orb_preset preset,
                        orb_alignment *out, int *lifted) {
-  const orb_landmark held[ORB_FIND_INSET_PAIRS] = {0};
-  for (int32_t s = 1; out->match.is_part && s < out->shape_count; s++) {
+  const orb_landmark none_soft[ORB_FIND_INSET_PAIRS] = {0};
+  if (!out->match.is_part) {
+    return orb_align_lift(ctx, copies, landmarks, preset, out, lifted);
+  }
+  for (int32_t s = 1; s < out->shape_count; s++) {
     orb_copied_shape *one = &copies->of[s];
     int32_t *vertex = ORB_NEW(ctx, int32_t, out->landmark_count);
     if (!vertex) {
@@ -101,7 +104,7 @@ static orb_status lift(orb_context *ctx, orb_copies *copies, const orb_landmark 
     orb_free(ctx, one->whole.landmark_vertices);
     one->whole.landmark_vertices = vertex;
   }
-  return orb_align_lift(ctx, copies, out->match.is_part ? held : landmarks, preset, out, lifted);
+  return orb_align_lift(ctx, copies, none_soft, preset, out, lifted);
 }
 
 /* Aligns copies of the later shapes, then lets the shapes follow. *lifted 0: the whole shapes must be aligned, because
@@ -145,7 +148,7 @@ static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, cons
   } else {
     memset(&out->match, 0, sizeof out->match);
   }
-  ORB_TRY(orb_align_find(ctx, out, clear));
+  ORB_TRY(orb_align_find(ctx, out, out->match.is_part ? ORB_FIND_CLEAR : clear)); /* it is of the wholes */
   for (int32_t i = 0; out->rim_count > 0 && i < out->found_count * out->shape_count; i++) {
     const orb_place on_aligned = out->found[i];
     const int32_t s = i % out->shape_count;

@@ -3,7 +3,7 @@
  *
  *   char[8] "ORBALIGN", uint32 version, uint32 0x01020304 (byte order)
  *   int32 shapes, landmarks, found; double energy
- *   int32 1 and double bend, clear, confidence of the match, or 0
+ *   int32 1, int32 part and double bend, clear, lead, confidence of the match, or 0
  *   int32 alternatives; for each double cost, int32 shape, int32 count, count × shapes places (int32 triangle,
  *     double[3])
  *   int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place

@@ -5,9 +5,9 @@ docs/bench-confidence.md.
     tests/bench/confidence.py [--fit FILE.json ...] [--report FILE.json ...]
 
 Every FILE is what tests/bench/correspond.py wrote by --json, measured without landmarks. --fit fits the weights by
-logistic regression to the pairs of the half `choose`, and prints them. --report counts the pairs of all files by the
-confidence that the version has given them. Parts, whose confidence is a constant, are left out of the fit and counted
-by themselves. Standard library only.
+logistic regression to the drawn pairs of FITTED and to other pairs of the half `choose`, and prints them. --report
+counts the pairs by the confidence that the version has given them, those that are fitted to by themselves. Parts, whose
+confidence is a constant, are left out of the fit and counted by themselves. Standard library only.
 """
 import argparse
 import json
@@ -17,21 +17,24 @@ import statistics
 
 RIGHT = 10  # mean error up to which a pair is right, as in correspond.py
 CLEAR = 0.5  # ORB_FIND_CLEAR
+FITTED = ("drawn 17", "drawn 19", "drawn 29")  # sets that the weights are fitted to; maps were chosen on 17 and 19
 RIDGE = 0.02  # weak: a weight of 5 costs as much as a quarter of one pair that is fully wrong
 ROUNDS = 60
 BINS = ((0, 0.2), (0.2, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.001))
 
 
 def read(files):
-    """The pairs of results: (features, right, confidence, is a part, half, name). A pair counts once."""
+    """The pairs of results: (features, right, confidence, is a part, is fitted to). A pair counts once."""
     pairs = {}
     for file in files:
         for r in json.loads(pathlib.Path(file).read_text(encoding="utf-8"))["pairs"]:
             match = r.get("match")
-            if str(r["given"]) == "0" and match and "errors" in r:
+            is_measured = str(r["given"]) == "0" and r["version"] == "now" and "errors" in r
+            if is_measured and r["set"] != "real" and match:
                 features = (1, min(match["clear"], CLEAR), match["bend"], math.log(max(1, r["energy"])))
+                is_fitted = r["set"] in FITTED if r["set"].startswith("drawn") else r["half"] == "choose"
                 pairs[r["set"], r["pair"]] = (features, statistics.mean(r["errors"]) <= RIGHT, match["confidence"],
-                                              match.get("part", False), r["half"], r["pair"])
+                                              match.get("part", False), is_fitted)
     return list(pairs.values())
 
 
@@ -81,18 +84,20 @@ def main():
     parser.add_argument("--fit", nargs="+", default=[], metavar="FILE")
     parser.add_argument("--report", nargs="+", default=[], metavar="FILE")
     options = parser.parse_args()
-    chosen = [pair for pair in read(options.fit) if pair[4] == "choose" and not pair[3]]
+    chosen = [pair for pair in read(options.fit) if pair[4] and not pair[3]]
     if chosen:
         constant, clear, bend, energy = fit(chosen)
         wrong = sum(not right for _, right, *_ in chosen)
         print(f"fitted to {len(chosen)} pairs, {wrong} of them wrong: odds = {constant:.2f} + {clear:.2f} clear "
               f"− {-bend:.2f} bend − {-energy:.2f} ln(energy)")
-    for file in options.report:
-        pairs = [pair for pair in read([file]) if not pair[3]]
-        parts = [pair for pair in read([file]) if pair[3]]
-        error = statistics.mean((right - confidence) ** 2 for _, right, confidence, *_ in pairs)
-        print(f"\n{file}: {len(pairs)} pairs, {sum(not p[1] for p in pairs)} wrong, mean squared error {error:.3f}\n\n"
-              f"{table(pairs)}")
+    reported = read(options.report)
+    for is_fitted, name in ((False, "that the weights were not fitted to"), (True, "that they were fitted to")):
+        pairs = [pair for pair in reported if pair[4] == is_fitted and not pair[3]]
+        parts = [pair for pair in reported if pair[4] == is_fitted and pair[3]]
+        if pairs:
+            error = statistics.mean((right - confidence) ** 2 for _, right, confidence, *_ in pairs)
+            wrong = sum(not pair[1] for pair in pairs)
+            print(f"\n{len(pairs)} pairs {name}, {wrong} wrong, mean squared error {error:.3f}\n\n{table(pairs)}")
         if parts:
             print(f"\nparts: {sum(p[1] for p in parts)} of {len(parts)} right")
 

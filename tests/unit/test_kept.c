@@ -122,6 +122,7 @@ static void what_is_read_was_written(void **state) {
       add_attributes(&b);
     }
     align(&b, cases[i].method, cases[i].landmarks, &made);
+    made.match.is_part = made.match.is_measured; /* these bodies are no parts, but the member must be kept */
     assert_int_equal(orb_alignment_write(b.ctx, b.shape, &made, &bytes), ORB_OK);
     assert_int_equal(orb_alignment_read(b.ctx, bytes.data, bytes.size, b.shape, 2, &read), ORB_OK);
     check_same(&made, &read);

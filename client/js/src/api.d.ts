@@ -453,7 +453,7 @@ export type Supermesh = {
   }>;
   /** How far you can rely on the correspondence that orbmorph found; with more than two shapes, bend, clear and lead are each the worst of all maps. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
   match?: {
-    /** From 0 to 1, calibrated on pairs of shapes: of measured matches with this confidence, about this share was right, and of those with 0.8 or more 98 % (docs/bench-confidence.md). */
+    /** From 0 to 1, calibrated on pairs of shapes: of measured matches with about this confidence, about this share was right (docs/bench-confidence.md). */
     confidence: number;
     /** `sure` from a confidence of 0.8 on, `likely` from 0.5 on, else `unsure`. */
     verdict: 'sure' | 'likely' | 'unsure';
@@ -463,7 +463,7 @@ export type Supermesh = {
     lead: number;
     /** How much the best rough map bends the shapes: 0 for a rigid motion. */
     bend: number;
-    /** True if one of two shapes is a part of the other one, as a head is of a bust, and is laid onto it in space; else absent. `bend`, `clear` and `lead` are then of the shapes as wholes. */
+    /** True if one of two shapes is a part of the other one, as a head is of a bust, and was matched with it in space; else absent. `bend`, `clear` and `lead` are then of the shapes as wholes. */
     part?: true;
   };
   /** Other correspondences that the search considered, the best first; empty unless a correspondence was found. Absent if an older engine made the supermesh. */

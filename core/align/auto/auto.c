@@ -237,7 +237,7 @@ static orb_status align_inset(orb_context *ctx, const orb_align_shape *shapes, m
   const orb_held_pairs pairs = {inset->vertex[0], ORB_FIND_INSET_PAIRS, inset->count};
   orb_alignment other;
   ORB_TRY(orb_align_held(ctx, shapes, 2, &pairs, 1, options, &other, held));
-  if (*held && other.energy > ORB_FIND_PART_BAD) {
+  if (*held && other.energy > ORB_FIND_INSET_MOST_ENERGY) {
     orb_alignment_free(ctx, &other);
     *held = 0;
   }

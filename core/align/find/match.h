@@ -79,8 +79,9 @@ typedef struct orb_match {
 /* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
  * poses. Only maps that take the first few landmarks near their partners count; the targets then take all landmarks
  * there. walks: landmark walks lead to the map of shapes that bend much; they need samples of the targets only, so
- * these come from coarser copies. Free `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on
- * all threads, and the result has the same bytes for any number of them. */
+ * these come from coarser copies; and two shapes that bend are searched for a part, which takes another 0.1 s. Free
+ * `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on all threads, and the result has the
+ * same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, int walks, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
@@ -99,7 +100,7 @@ ORB_MUST_CHECK orb_status orb_match_choose(orb_context *ctx, orb_match *match, i
  * only to be described: its others no longer belong to its trials. */
 void orb_match_demote(orb_match *match);
 /* The confidence in a match, 0 to 1, from its bend, its `clear`, its `lead` and the energy of the map that followed it:
- * calibrated from 0.8 on (docs/bench-confidence.md). */
+ * calibrated (docs/bench-confidence.md). */
 double orb_match_confidence(double bend, double clear, double lead, double energy);
 void orb_match_free(orb_context *ctx, orb_match *match);
 

@@ -51,10 +51,10 @@ typedef struct orb_aligned_shape {
 
 enum { ORB_FOUND_MAX = 12, ORB_ALTERNATIVES_MAX = 4, ORB_ALTERNATIVE_PAIRS = 12 };
 
-/* Another correspondence that the search without landmarks considered. If the shapes are matched as a part and a whole,
- * the first one is that of the wholes. It matches one later shape differently, and all
+/* Another correspondence that the search without landmarks considered. It matches one later shape differently, and all
  * others as the best one does. To request it, give its places as landmarks. The search found these places, so they mark
- * the same features only roughly. */
+ * the same features only roughly. Where one shape is matched as a part of the other one, the first alternative matches
+ * the shapes as wholes. */
 typedef struct orb_alternative {
   double cost;   /* how much its rough map bends the shapes, as a multiple of the best one's: at least 1 */
   int32_t shape; /* the later shape that is matched differently */
@@ -75,8 +75,8 @@ typedef struct orb_match_facts {
   double bend;     /* of the best rough map: 0 for a rigid motion */
   double clear;    /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
   double lead;     /* how much the nearest other rough map bends the shapes, divided by the same for the best one;
-                      both count half of the rotation in space and of the asymmetry. About 1: the shapes do not decide which
-                      is right,         for example because one looks alike from several sides. At most 100 */
+                      both count half of the rotation in space and of the asymmetry. About 1: the shapes do not decide
+                      which is right, for example because one looks alike from several sides. At most 100 */
   double confidence; /* 0 to 1, with the mean energy; calibrated on two shapes (docs/bench-confidence.md) */
 } orb_match_facts;
 

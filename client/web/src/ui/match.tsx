@@ -9,8 +9,8 @@ import { Button, count, relative } from './parts';
 const CREDIBLE = 2;
 
 /** What may be otherwise, in words, by the best other match that has any: "the tail of dog may be the … of giraffe". */
-function doubtOf({ matches, supermesh: { shapes } }: Result): string | null {
-  if (!matches?.told || matches.at > 0) return null;
+function doubtOf({ matches, supermesh: { shapes, match } }: Result): string | null {
+  if (!matches?.told || matches.at > 0 || match?.part) return null; // the first other match of a part is of the wholes
   const { landmarks, others } = matches.told;
   for (const { cost, shape, swaps, flips } of others) {
     if (cost > CREDIBLE) continue;

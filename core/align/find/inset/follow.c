@@ -58,9 +58,9 @@ static int solve(sums *s, orb_similarity *out) {
   return 1;
 }
 
-/* Follows closest points once, with the first `count` samples. near: NULL, then feet on the planes of the grid take the
- * part of the nearest places; or a place for each sample, see orb_inset_nearest(). moves 0: measures only. Returns the
- * mean weight before, or 0 if there is no way on. */
+/* Follows closest points once, with the first `count` samples. near: NULL, then feet on the planes of the grid stand
+ * for the nearest places; or a place for each sample, see orb_inset_nearest(). moves 0: measures only. Returns the mean
+ * weight before, or 0 if there is no way on. */
 static double follow(const orb_inset_pair *c, int32_t count, double width, int moves, orb_place *near,
                      orb_similarity *s) {
   sums sum;
@@ -156,7 +156,7 @@ orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *c, const orb
     const int32_t samples = stage->samples < c->sample_count ? stage->samples : c->sample_count;
     const int is_last = n + 1 == ORB_FIND_INSET_STAGES;
     count = stage->turns ? turn_again(c, stage->width, all, count) : count;
-    count = n == 0 ? count : take_best(all, count, stage->places);
+    count = take_best(all, count, stage->places);
     for (int32_t i = 0; i < count; i++) {
       for (int32_t k = 0; k < samples && is_last; k++) {
         near[k].triangle = -1;

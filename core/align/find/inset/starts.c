@@ -97,7 +97,7 @@ static void turn_samples(const orb_inset_grid *g, const orb_inset_sample *sample
   }
 }
 
-/* Finds the best place of one turn and one size, of every other node. Returns 0 if there is none. */
+/* Finds the best place of one turn and one size, at every other node along each axis. Returns 0 if there is none. */
 static int best_place(const orb_inset_grid *g, const orb_inset_sample *sample, orb_similarity *one) {
   turned by;
   double best = 0;
