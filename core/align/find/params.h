@@ -277,7 +277,7 @@ static const double ORB_FIND_CLEAR = 0.5;
  * docs/bench-confidence.md has what they give on other pairs. */
 static const double ORB_FIND_SURE = 3.5, ORB_FIND_SURE_CLEAR = 3.8, ORB_FIND_SURE_BEND = 3.9,
                     ORB_FIND_SURE_ENERGY = 5.7;
-/* Confidence in a part. Of 37 measured parts all were right, but they are heads and busts of one generator, so the
+/* Confidence in a part. Of 35 measured parts all were right, but they are heads and busts of one generator, so the
  * match does not count as sure. */
 static const double ORB_FIND_SURE_PART = 0.75;
 /* Two maps share the confidence as 1 to exp(−(lead − 1) / this): half of it is left if they bend the shapes alike. This
