@@ -127,16 +127,17 @@ enum {
   ORB_FIND_INSET_SIZES = 4
 };
 
-/* How places follow closest points: fewer places, more samples and narrower weights from stage to stage. */
+/* How places follow closest points: fewer places, more samples and narrower weights from stage to stage. With 16 places
+ * at first, half of the heads come out turned. */
 typedef struct orb_find_inset_stage {
-  int turns; /* the best places are turned about their middles first */
-  int places, samples,
-      rounds;   /* at first 240 places: all turns and sizes. With 16, half of the heads come out turned */
+  int turns;  /* the best places are turned about their middles first */
+  int places; /* the best ones that differ follow; 0: all, of which those of one turn may differ in size alone */
+  int samples, rounds;
   double width; /* standard deviation of the weight of a closest point, over its distance, in radii of a ball of the
                    large shape's area: at first the reach of a step of the grid, at last the depth of a face */
 } orb_find_inset_stage;
 static const orb_find_inset_stage ORB_FIND_INSET_STAGE[ORB_FIND_INSET_STAGES] = {
-    {0, 240, 48, 6, 0.3},
+    {0, 0, 48, 6, 0.3},
     {0, 100, 64, 6, 0.2},
     {1, 60, 64, 5, 0.2},
     {0, 30, 120, 8, 0.12},

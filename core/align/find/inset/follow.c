@@ -156,7 +156,7 @@ orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *c, const orb
     const int32_t samples = stage->samples < c->sample_count ? stage->samples : c->sample_count;
     const int is_last = n + 1 == ORB_FIND_INSET_STAGES;
     count = stage->turns ? turn_again(c, stage->width, all, count) : count;
-    count = take_best(all, count, stage->places);
+    count = stage->places > 0 ? take_best(all, count, stage->places) : count;
     for (int32_t i = 0; i < count; i++) {
       for (int32_t k = 0; k < samples && is_last; k++) {
         near[k].triangle = -1;
