@@ -85,28 +85,6 @@ static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, 
              : orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
 }
 
-/* Lets whole shapes follow their copies. What is held for a part stays held. */
-static orb_status lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, orb_preset preset,
-                       orb_alignment *out, int *lifted) {
-  const orb_landmark none_soft[ORB_FIND_INSET_PAIRS] = {0};
-  if (!out->match.is_part) {
-    return orb_align_lift(ctx, copies, landmarks, preset, out, lifted);
-  }
-  for (int32_t s = 1; s < out->shape_count; s++) {
-    orb_copied_shape *one = &copies->of[s];
-    int32_t *vertex = ORB_NEW(ctx, int32_t, out->landmark_count);
-    if (!vertex) {
-      return ORB_E_NO_MEMORY;
-    }
-    for (int32_t l = 0; l < out->landmark_count; l++) {
-      vertex[l] = one->copy.vertex[out->shapes[s].landmark_vertices[l]];
-    }
-    orb_free(ctx, one->whole.landmark_vertices);
-    one->whole.landmark_vertices = vertex;
-  }
-  return orb_align_lift(ctx, copies, none_soft, preset, out, lifted);
-}
-
 /* Aligns copies of the later shapes, then lets the shapes follow. *lifted 0: the whole shapes must be aligned, because
  * the copies do not meet at the landmarks or are not certified, or a shape cannot follow its copy. `out` is then empty.
  */
@@ -123,7 +101,7 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
     status = align_shapes(ctx, copies.shapes, shape_count, copies.landmarks, landmark_count, options, out);
   }
   if (status == ORB_OK) {
-    status = lift(ctx, &copies, landmarks, options->preset, out, lifted);
+    status = orb_align_lift(ctx, &copies, landmarks, options->preset, out, lifted);
   }
   orb_copies_free(ctx, &copies);
   return orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;

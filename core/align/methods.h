@@ -79,14 +79,15 @@ ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *align
                                           const orb_aims *aims, orb_preset preset);
 
 /* Method `auto` without landmarks; auto/auto.c describes it. The found landmarks and the confidence of the match are
- * left to the caller. */
+ * left to the caller. If match.is_part is set, what is held for that are the landmarks of `out`, which the caller
+ * forgets. */
 ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                          const orb_align_options *options, orb_alignment *out);
 
 /* Extends an alignment of copies to the whole shapes. landmarks: the caller's, on the given meshes. The maps of the
- * copies are refined, and soft landmarks are held by their springs. The alternatives become places on the given meshes.
- * *lifted 0: a map folds at the level of its copy, and `alignment` is empty. `copies` is used up in any case; the
- * caller frees it. */
+ * copies are refined, soft landmarks are held by their springs, and what is held for a part stays held. The
+ * alternatives become places on the given meshes. *lifted 0: a map folds at the level of its copy, and `alignment` is
+ * empty. `copies` is used up in any case; the caller frees it. */
 ORB_MUST_CHECK orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks,
                                          orb_preset preset, orb_alignment *alignment, int *lifted);
 

@@ -121,6 +121,7 @@ enum {
   ORB_FIND_INSET_PAIRS =
       24, /* vertices that are held like landmarks: with 24 true landmarks a head lies better than with 8 */
   ORB_FIND_INSET_SAMPLES = 200, /* vertices that follow closest points at the end */
+  ORB_FIND_INSET_LOOKUPS = 48,  /* of them that are looked up in the grid: with 32, more heads come out turned */
   ORB_FIND_INSET_NODES = 18,    /* of the grid along the longest side of the large shape: a head has 6 then */
   ORB_FIND_INSET_TURNED = 4,    /* places that are turned about their middles */
   ORB_FIND_INSET_STAGES = 5,
@@ -152,6 +153,11 @@ static const double ORB_FIND_INSET_SIZE[ORB_FIND_INSET_SIZES] = {0.74, 0.6, 0.48
 /* A place is left early if the mean weight of its first samples is below this: half of what a place has that is off by
  * a step of the grid. */
 static const double ORB_FIND_INSET_BAD = 0.15;
+/* Degrees by which turns lie between those that are 44° apart: about half of that. */
+static const double ORB_FIND_INSET_BETWEEN = 24;
+/* A place that shrinks below this size while it follows closest points is lost: half of the smallest part. So is one
+ * that grows to the size of the large shape. */
+static const double ORB_FIND_INSET_LOST_BELOW = 0.2;
 /* Places nearer than this are one: the sum of the distance of their middles and of the angle between them, in radii of
  * the part and radians. */
 static const double ORB_FIND_INSET_SAME = 0.15;

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/params.h"
 #include "align/methods.h"
 #include "align/sheet/landmarks.h"
 #include "align/sheet/sheet.h"
@@ -149,12 +150,34 @@ static orb_status lift_alternatives(orb_context *ctx, const orb_copies *copies, 
   return ORB_OK;
 }
 
+/* What is held for a part is at vertices of the copies. Holds it at the same vertices of the whole shapes. */
+static orb_status lift_held(orb_context *ctx, orb_copies *copies, const orb_alignment *alignment) {
+  for (int32_t s = 1; s < alignment->shape_count; s++) {
+    orb_copied_shape *one = &copies->of[s];
+    int32_t *vertex = ORB_NEW(ctx, int32_t, alignment->landmark_count);
+    if (!vertex) {
+      return ORB_E_NO_MEMORY;
+    }
+    for (int32_t l = 0; l < alignment->landmark_count; l++) {
+      vertex[l] = one->copy.vertex[alignment->shapes[s].landmark_vertices[l]];
+    }
+    orb_free(ctx, one->whole.landmark_vertices);
+    one->whole.landmark_vertices = vertex;
+  }
+  return ORB_OK;
+}
+
 orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, orb_preset preset,
                           orb_alignment *alignment, int *lifted) {
+  const orb_landmark none_soft[ORB_FIND_INSET_PAIRS] = {0};
   double sum = 0;
   orb_status status;
   *lifted = 0;
   ORB_GO(status, lift_alternatives(ctx, copies, alignment), end);
+  if (alignment->match.is_part) {
+    landmarks = none_soft;
+    ORB_GO(status, lift_held(ctx, copies, alignment), end);
+  }
   for (int32_t s = 1; s < alignment->shape_count && sum < INFINITY; s++) {
     double energy = INFINITY;
     ORB_GO(status, lift_shape(ctx, &copies->of[s], landmarks, s, preset, alignment, &energy), end);

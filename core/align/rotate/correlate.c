@@ -18,6 +18,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "numeric/clones.h"
+#include "numeric/quaternion.h"
 #include "numeric/vec3.h"
 
 /* Chosen by trial. */
@@ -227,21 +228,6 @@ static orb_status score_of(const search *s, const field of[2], const double r[9]
   return ORB_OK;
 }
 
-static void from_quaternion(const double q[4], double r[9]) {
-  double w = q[0], x = q[1], y = q[2], z = q[3];
-  double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                 2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                 2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-  memcpy(r, m, sizeof m);
-}
-
-static void quaternion_product(const double a[4], const double b[4], double out[4]) {
-  double q[4] = {
-      a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-      a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-  memcpy(out, q, sizeof q);
-}
-
 static int is_near(const double a[4], const double b[4]) {
   return fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]) > cos(APART / 2);
 }
@@ -279,7 +265,7 @@ static void grid_point(int32_t i, double q[4]) {
   double half = sqrt((1 + z) / 2), other = sqrt((1 - z) / 2);
   double tilt[4] = {half, -other * sin(angle), other * cos(angle), 0};
   double spin[4] = {cos(M_PI * j / SPINS), 0, 0, sin(M_PI * j / SPINS)};
-  quaternion_product(tilt, spin, q);
+  orb_quaternion_product(tilt, spin, q);
 }
 
 static void score_grid(void *arg, int64_t begin, int64_t end, int thread) {
@@ -290,7 +276,7 @@ static void score_grid(void *arg, int64_t begin, int64_t end, int thread) {
   for (int64_t i = begin; i < end && *status == ORB_OK; i++) {
     double q[4], r[9];
     grid_point((int32_t)i, q);
-    from_quaternion(q, r);
+    orb_quaternion_rotation(q, r);
     *status = score_of(s, s->coarse, r, &s->upright[i], &s->best[i]);
   }
 }
@@ -307,7 +293,7 @@ static orb_status coarse(search *s) {
 /* Pattern search: small rotations around the three axes in both directions, halved until they are tiny. */
 static orb_status descend(const search *s, start *from, int use_upright) {
   double r[9], up, any;
-  from_quaternion(from->q, r);
+  orb_quaternion_rotation(from->q, r);
   ORB_TRY(score_of(s, s->fine, r, &up, &any));
   from->score = use_upright ? up : any;
   for (double step = FIRST_STEP; step > LAST_STEP; step /= 2) {
@@ -316,8 +302,8 @@ static orb_status descend(const search *s, start *from, int use_upright) {
       for (int k = 0; k < 6; k++) {
         double spin[4] = {cos(step / 2), 0, 0, 0}, q[4];
         spin[1 + k / 2] = k % 2 ? -sin(step / 2) : sin(step / 2);
-        quaternion_product(spin, from->q, q);
-        from_quaternion(q, r);
+        orb_quaternion_product(spin, from->q, q);
+        orb_quaternion_rotation(q, r);
         ORB_TRY(score_of(s, s->fine, r, &up, &any));
         if ((use_upright ? up : any) > from->score) {
           from->score = use_upright ? up : any;
@@ -393,7 +379,7 @@ orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a
   ORB_GO(status, search_create(ctx, a, b, from, to, count, &s), end);
   ORB_GO(status, refine(s, 0), end);
   const start *chosen = choose(&s->kept);
-  from_quaternion(chosen->q, rotation);
+  orb_quaternion_rotation(chosen->q, rotation);
   if (score) {
     *score = chosen->score;
   }
@@ -428,7 +414,7 @@ orb_status orb_rotation_candidates(orb_context *ctx, const orb_aligned_shape *a,
   ORB_GO(status, refine(s, 1), end);
   for (const start *top = taken; top && *count < most && *count < 2 * STARTS;) {
     taken[*count] = *top;
-    from_quaternion(top->q, rotations + 9 * (*count)++);
+    orb_quaternion_rotation(top->q, rotations + 9 * (*count)++);
     top = next_start(&s->kept, taken, *count);
   }
 end:

@@ -81,7 +81,7 @@ static double follow(const orb_inset_pair *c, int32_t count, double width, int m
   if (!moves) {
     return score;
   }
-  return solve(&sum, s) && s->scale > ORB_FIND_INSET_SMALLEST / 2 && s->scale < 1 ? score : 0;
+  return solve(&sum, s) && s->scale > ORB_FIND_INSET_LOST_BELOW && s->scale < 1 ? score : 0;
 }
 
 /* How far two places of the part are apart. */
@@ -132,7 +132,7 @@ static int32_t turn_again(const orb_inset_pair *c, double width, tried *all, int
         const double *row = all[i].at.rotation + k / 3 * 3, *column = turn[t] + k % 3;
         one->at.rotation[k] = row[0] * column[0] + row[1] * column[3] + row[2] * column[6];
       }
-      one->score = follow(c, ORB_INSET_LOOKUPS, width, 0, NULL, &one->at);
+      one->score = follow(c, ORB_FIND_INSET_LOOKUPS, width, 0, NULL, &one->at);
     }
   }
   return count;

@@ -7,7 +7,7 @@
 /* The samples are spread over the small shape, so that the first of them are as well. */
 typedef struct orb_inset_pair {
   const orb_inset_sample *sample;
-  int32_t sample_count; /* at least ORB_INSET_LOOKUPS, at most ORB_FIND_INSET_SAMPLES */
+  int32_t sample_count; /* at least ORB_FIND_INSET_LOOKUPS, at most ORB_FIND_INSET_SAMPLES */
   const orb_mesh *large;
   const orb_nearest *tree;    /* of `large` */
   const orb_inset_grid *grid; /* likewise */

@@ -135,7 +135,7 @@ static orb_status look(orb_context *ctx, void *arg, int32_t i) {
   double stray = 1;
   int32_t count;
   ORB_TRY(search_create(ctx, c->trials, c));
-  if (c->sample_count < ORB_INSET_LOOKUPS || !is_body(c->part) || !is_body(c->whole)) {
+  if (c->sample_count < ORB_FIND_INSET_LOOKUPS || !is_body(c->part) || !is_body(c->whole)) {
     return ORB_OK;
   }
   for (int32_t k = 0; k < c->sample_count; k++) {

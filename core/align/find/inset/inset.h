@@ -18,8 +18,8 @@ typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_inset {
   int32_t count; /* 0: neither shape is a part of the other one */
-  int32_t vertex[2]
-                [ORB_FIND_INSET_PAIRS]; /* of both shapes, which correspond: spread over the part; none comes twice */
+  /* Vertices of both shapes, which correspond: spread over the part; none comes twice. */
+  int32_t vertex[2][ORB_FIND_INSET_PAIRS];
 } orb_inset;
 
 /* trials: opened and surveyed. About 0.1 s of one thread, on two threads if there are two. */

@@ -5,12 +5,13 @@
 
 #include "base/check.h"
 #include "base/context.h"
+#include "numeric/quaternion.h"
 
 /* The samples at one turn and one size, when the middle of the part is at a node: how many nodes away each of them is,
  * and its normal. */
 typedef struct turned {
-  int32_t away[ORB_INSET_LOOKUPS][3];
-  float normal[ORB_INSET_LOOKUPS][3];
+  int32_t away[ORB_FIND_INSET_LOOKUPS][3];
+  float normal[ORB_FIND_INSET_LOOKUPS][3];
 } turned;
 
 /* The rotations that take a dodecahedron to itself, as unit quaternions: the cosines of half their angles come first.
@@ -41,26 +42,17 @@ static void list_quaternions(double out[ORB_INSET_TURNS][4]) {
   ORB_ASSERT(count == ORB_INSET_TURNS);
 }
 
-static void rotation_of(const double q[4], double rotation[9]) {
-  const double w = q[0], x = q[1], y = q[2], z = q[3];
-  const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
-                       2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                       2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
-  memcpy(rotation, r, sizeof r);
-}
-
 void orb_inset_fine_turns(double (*rotation)[9]) {
   static const double sign[5][3] = {{0, 0, 0}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
   double turn[ORB_INSET_TURNS][4];
-  const double angle = 24 * M_PI / 180, c = cos(angle / 2), s = sin(angle / 2) / sqrt(3);
+  const double angle = ORB_FIND_INSET_BETWEEN * M_PI / 180, c = cos(angle / 2), s = sin(angle / 2) / sqrt(3);
   list_quaternions(turn);
   for (int i = 0; i < ORB_INSET_FINE_TURNS; i++) {
     const double *p = turn[i % ORB_INSET_TURNS], *axis = sign[i / ORB_INSET_TURNS];
     const double q[4] = {i < ORB_INSET_TURNS ? 1 : c, s * axis[0], s * axis[1], s * axis[2]};
-    const double both[4] = {
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3], p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1], p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]};
-    rotation_of(both, rotation[i]);
+    double both[4];
+    orb_quaternion_product(p, q, both);
+    orb_quaternion_rotation(both, rotation[i]);
   }
 }
 
@@ -69,7 +61,7 @@ void orb_inset_fine_turns(double (*rotation)[9]) {
 static double look_up(const orb_inset_grid *g, const turned *samples, const int32_t middle[3]) {
   const float scale = (float)(1 / (2 * g->step));
   float sum = 0;
-  for (int i = 0; i < ORB_INSET_LOOKUPS; i++) {
+  for (int i = 0; i < ORB_FIND_INSET_LOOKUPS; i++) {
     const int32_t *away = samples->away[i], x = middle[0] + away[0], y = middle[1] + away[1], z = middle[2] + away[2];
     if (x >= 0 && x < g->count[0] && y >= 0 && y < g->count[1] && z >= 0 && z < g->count[2]) {
       const float *node = orb_inset_node(g, x, y, z);
@@ -77,16 +69,16 @@ static double look_up(const orb_inset_grid *g, const turned *samples, const int3
       const float facing = n[0] * node[4] + n[1] * node[5] + n[2] * node[6], near = 1 - node[0] * scale;
       sum += facing > 0 && near > 0 ? facing * near : 0;
     }
-    if (i + 1 == ORB_INSET_LOOKUPS / 4 && sum < (float)ORB_FIND_INSET_BAD * (float)(i + 1)) {
+    if (i + 1 == ORB_FIND_INSET_LOOKUPS / 4 && sum < (float)ORB_FIND_INSET_BAD * (float)(i + 1)) {
       return 0;
     }
   }
-  return (double)sum / ORB_INSET_LOOKUPS;
+  return (double)sum / ORB_FIND_INSET_LOOKUPS;
 }
 
 static void turn_samples(const orb_inset_grid *g, const orb_inset_sample *sample, const orb_similarity *by,
                          turned *out) {
-  for (size_t i = 0; i < ORB_INSET_LOOKUPS; i++) {
+  for (size_t i = 0; i < ORB_FIND_INSET_LOOKUPS; i++) {
     double p[3], n[3];
     orb_similarity_apply(by, sample[i].position, p);
     orb_rotate_point(by->rotation, sample[i].normal, n);
@@ -128,7 +120,7 @@ orb_status orb_inset_starts(orb_context *ctx, const orb_inset_grid *grid, const 
   for (int i = 0; i < ORB_INSET_TURNS; i++) {
     for (int z = 0; z < ORB_FIND_INSET_SIZES; z++) {
       orb_similarity one = {.scale = ORB_FIND_INSET_SIZE[z]};
-      rotation_of(turn[i], one.rotation);
+      orb_quaternion_rotation(turn[i], one.rotation);
       if (best_place(grid, sample, &one)) {
         start[(*count)++] = one;
       }

@@ -7,8 +7,7 @@
 #include "align/find/inset/similarity.h"
 
 enum {
-  ORB_INSET_LOOKUPS = 48, /* samples that are looked up: with 32, more heads come out turned */
-  ORB_INSET_TURNS = 60,   /* rotations that take a dodecahedron to itself: any rotation is within 45° of one of them */
+  ORB_INSET_TURNS = 60, /* rotations that take a dodecahedron to itself: any rotation is within 45° of one of them */
   ORB_INSET_FINE_TURNS = 5 * ORB_INSET_TURNS,
   ORB_INSET_STARTS = ORB_INSET_TURNS * ORB_FIND_INSET_SIZES
 };
@@ -19,12 +18,12 @@ typedef struct orb_inset_sample {
 } orb_inset_sample;
 
 /* Writes ORB_INSET_FINE_TURNS rotations, all about as far from the next ones: ORB_INSET_TURNS of them, and each again
- * after a rotation by 24° about each of the axes of a tetrahedron. */
+ * after a rotation by ORB_FIND_INSET_BETWEEN about each of the axes of a tetrahedron. */
 void orb_inset_fine_turns(double (*rotation)[9]);
 
 /* Finds the best node for each turn and each of ORB_FIND_INSET_SIZE, and writes these similarities, ORB_INSET_STARTS at
- * most: a turn and a size that lie badly everywhere have none. sample: ORB_INSET_LOOKUPS of them. O(nodes · turns ·
- * sizes · samples). */
+ * most: a turn and a size that lie badly everywhere have none. sample: ORB_FIND_INSET_LOOKUPS of them. O(nodes · turns
+ * · sizes · samples). */
 ORB_MUST_CHECK orb_status orb_inset_starts(orb_context *ctx, const orb_inset_grid *grid, const orb_inset_sample *sample,
                                            orb_similarity *start, int32_t *count);
 
