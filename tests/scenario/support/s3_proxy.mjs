@@ -1,4 +1,5 @@
 // A proxy in front of an S3 server that answers some requests like a failing server.
+import { readFileSync } from 'node:fs';
 import http from 'node:http';
 
 /** Forwards the next request. */
@@ -15,13 +16,34 @@ export const late = 'late';
 export const half = 'half';
 /** Half of the body, as a whole answer. */
 export const short = 'short';
-/** Headers and body in packets of their own, of which Nagle's algorithm holds the second back until the first is
- * acknowledged. */
+/** Headers and body in packets of their own. The body waits until the headers are acknowledged, as Nagle's algorithm
+ * makes it wait. */
 export const apart = 'apart';
 /** One bit of the body is another. */
 export const flipped = 'flipped';
 
-function answer(how, from, body, response) {
+/** How many bytes Linux has sent or will send on this IPv4 connection that the other end has not acknowledged. */
+function unacknowledged({ localPort, remotePort }) {
+  const port = (number) => number.toString(16).toUpperCase().padStart(4, '0');
+  const ends = new RegExp(`:${port(localPort)} [0-9A-F]{8}:${port(remotePort)} [0-9A-F]{2} ([0-9A-F]{8}):`);
+  return Number.parseInt(ends.exec(readFileSync('/proc/net/tcp', 'latin1'))[1], 16);
+}
+
+/** Sends the headers, then the body. Adds to `waits` for how many milliseconds the headers were not acknowledged. */
+function answerApart(from, headers, body, response, waits) {
+  delete headers.connection; // the server closes each connection of the proxy
+  response.writeHead(from.statusCode, headers).flushHeaders();
+  const began = performance.now();
+  const send = () => {
+    if (response.destroyed) return;
+    if (unacknowledged(response.socket)) return setImmediate(send);
+    waits.push(performance.now() - began);
+    response.end(body);
+  };
+  setImmediate(send); // the headers are on their way then
+}
+
+function answer(how, from, body, response, waits) {
   const headers = { ...from.headers };
   const part = body.subarray(0, body.length >> 1);
   if (how === lost) return response.destroy();
@@ -30,10 +52,7 @@ function answer(how, from, body, response) {
     headers['content-length'] = part.length;
     response.writeHead(from.statusCode, headers).end(part);
   } else if (how === apart) {
-    response.socket.setNoDelay(false);
-    delete headers.connection; // the server closes each connection of the proxy
-    response.writeHead(from.statusCode, headers).flushHeaders();
-    setImmediate(() => response.end(body));
+    answerApart(from, headers, body, response, waits);
   } else if (how === half && part.length) {
     response.writeHead(from.statusCode, headers).write(part, () => response.destroy());
   } else {
@@ -45,10 +64,10 @@ function answer(how, from, body, response) {
 /**
  * Starts it in front of the server at `url`, until the test ends. `decide` chooses by {method, path, query, tries},
  * where tries counts the requests of this method to this path and query, from 1. It may return a promise, which holds
- * the request.
+ * the request. `waits` of the proxy are the milliseconds of each answer that was `apart`.
  */
 export async function s3Proxy(t, url, decide) {
-  const proxy = { decide, seen: [], tries: new Map() };
+  const proxy = { decide, seen: [], tries: new Map(), waits: [] };
   const server = http.createServer(async (request, response) => {
     const [path, query = ''] = request.url.split('?');
     const key = `${request.method} ${request.url}`;
@@ -82,6 +101,7 @@ export async function s3Proxy(t, url, decide) {
           from.on('error', () => {}),
           Buffer.alloc(0),
           response,
+          proxy.waits,
         );
       const chunks = [];
       try {
@@ -89,7 +109,7 @@ export async function s3Proxy(t, url, decide) {
       } catch {
         return response.destroy(); // the server went away
       }
-      answer(how, from, Buffer.concat(chunks), response);
+      answer(how, from, Buffer.concat(chunks), response, proxy.waits);
     });
   });
   await new Promise((done) => server.listen(0, '127.0.0.1', done));
