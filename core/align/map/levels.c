@@ -138,7 +138,7 @@ orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *
   orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
   for (int first = 1; status == ORB_OK; first = 0) {
     int last = r->live == c->vertex_count, count = sweeps_of(c, r, first, rough);
-    orb_map_set_pull(c, l, to_mesh, last ? 0 : pull);
+    orb_map_set_pull(c, l, to_mesh, fmax(last ? 0 : pull, c->hold));
     pull *= c->params.level.pull_fall;
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), count), done);
     if (!rough && (last || (!c->walks_first && orb_map_level_energy(l) > c->params.level.rigid))) {

@@ -19,8 +19,8 @@ static orb_status loosen(orb_map_run *c, orb_map_level *l, int most) {
   return ORB_OK;
 }
 
-/* Optimises the levels up to the coarse one. Without guides, the coarse one is loosened, and the energy becomes
- * INFINITY where limbs are twisted. */
+/* Optimises the levels up to the coarse one. With guides, the spatial targets hold the map. Without, the coarse one is
+ * loosened, and the energy becomes INFINITY where limbs are twisted. */
 static orb_status optimise(orb_map_run *c, int32_t guides, orb_map_walked *w) {
   const orb_map_params *p = &c->params;
   const int32_t n = c->vertex_count;
@@ -29,6 +29,7 @@ static orb_status optimise(orb_map_run *c, int32_t guides, orb_map_walked *w) {
   orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
   for (int first = 1, last = 0; !last && status == ORB_OK; first = 0) {
     last = w->refiner->live >= size;
+    orb_map_set_pull(c, &w->level, c->hierarchy->surface.to_mesh, w->hold);
     ORB_GO(status, orb_map_sweeps(c, &w->level, orb_map_hard(p), last ? p->walked.last_sweeps : p->walked.sweeps),
            done);
     w->energy = orb_map_level_energy(&w->level);
@@ -81,8 +82,7 @@ orb_status orb_map_walked_create(orb_map_run *c, int32_t guides, orb_map_walked 
   orb_walk_level level = {0};
   int stuck;
   orb_status status;
-  memset(w, 0, sizeof *w);
-  w->energy = INFINITY;
+  *w = (orb_map_walked){.energy = INFINITY, .hold = guides != 0 ? c->params.walked.hold : 0};
   ORB_GO(status, orb_map_walk_level(c, guides, &level, &w->fixed, &stuck), done);
   if (stuck) {
     goto done;
@@ -141,7 +141,10 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
 orb_status orb_map_walked_refine(orb_map_run *c, orb_map_walked *w) {
   int failed = 0;
   ORB_TRY(enter(c, w));
-  ORB_TRY(orb_map_levels_refine(c, w->refiner, &w->level, 0, 0, &failed));
+  c->hold = w->hold;
+  const orb_status status = orb_map_levels_refine(c, w->refiner, &w->level, 0, 0, &failed);
+  c->hold = 0;
+  ORB_TRY(status);
   w->energy = failed ? INFINITY : orb_map_level_energy(&w->level);
   if (!failed) {
     c->best_energy = w->energy;

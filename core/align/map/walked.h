@@ -11,19 +11,20 @@ typedef struct orb_map_walked {
   orb_refiner *refiner;
   orb_map_level level;
   double *fixed; /* points of the fixed shape, 3 per vertex */
-  double energy; /* INFINITY: there is no map, or it is hopeless */
+  double hold;   /* strength of the pull to the spatial targets that guided it; 0: nothing has guided it */
+  double energy; /* without the pull. INFINITY: there is no map, or it is hopeless */
 } orb_map_walked;
 
 /* Walks, and optimises the levels up to the coarse one, which is loosened only without guides. guides: samples of the
- * spatial targets that walk with the pairs, and are free afterwards. Only a map without guides can be hopeless by its
- * energy. Afterwards the run is as it was. Free `out` in any case. */
+ * spatial targets that walk with the pairs, and are free afterwards; then all targets pull (params.walked.hold). Only a
+ * map without guides can be hopeless by its energy. Afterwards the run is as it was. Free `out` in any case. */
 ORB_MUST_CHECK orb_status orb_map_walked_create(orb_map_run *run, int32_t guides, orb_map_walked *out);
 /* Walks with different numbers of guides; the map of least energy is loosened and replaces `best` if it is better. */
 ORB_MUST_CHECK orb_status orb_map_walked_improve(orb_map_run *run, orb_map_walked *best);
 void orb_map_walked_free(orb_map_run *run, orb_map_walked *walked);
 
-/* Refines to all vertices; the result becomes the best map if it is better. If a level has flips, its energy is
- * INFINITY. Otherwise `walked` is used up. */
+/* Refines to all vertices, and the spatial targets still pull; the result becomes the best map if it is better. If a
+ * level has flips, its energy is INFINITY. Otherwise `walked` is used up. */
 ORB_MUST_CHECK orb_status orb_map_walked_refine(orb_map_run *run, orb_map_walked *walked);
 
 #endif

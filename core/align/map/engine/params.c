@@ -47,6 +47,7 @@ static const orb_map_params DEFAULTS = {
                .last_sweeps = 100,
                .loosen = 30,
                .loosen_most = 12,
+               .hold = 10,
                .gain = 5e-3,
                .barriers = {0.1, 1},
                .hopeless = 3,
