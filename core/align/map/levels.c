@@ -131,14 +131,14 @@ orb_status orb_map_level_next(orb_map_run *c, orb_refiner *r, orb_map_level *l, 
   return ORB_OK;
 }
 
-orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *l, double pull, int rough,
+orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *l, double pull, double hold, int rough,
                                  int *failed) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
   unsigned char *known = ORB_NEW(c->ctx, unsigned char, c->vertex_count);
   orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
   for (int first = 1; status == ORB_OK; first = 0) {
     int last = r->live == c->vertex_count, count = sweeps_of(c, r, first, rough);
-    orb_map_set_pull(c, l, to_mesh, fmax(last ? 0 : pull, c->hold));
+    orb_map_set_pull(c, l, to_mesh, fmax(last ? 0 : pull, hold));
     pull *= c->params.level.pull_fall;
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), count), done);
     if (!rough && (last || (!c->walks_first && orb_map_level_energy(l) > c->params.level.rigid))) {
@@ -167,7 +167,7 @@ done:
 orb_status orb_map_levels_finish(orb_map_run *c, orb_refiner *r, orb_map_level *l, double pull, int rough) {
   int failed = 0;
   orb_map_level_store(c, l, r);
-  ORB_TRY(orb_map_levels_refine(c, r, l, pull, rough, &failed));
+  ORB_TRY(orb_map_levels_refine(c, r, l, pull, 0, rough, &failed));
   if (!failed && c->given_target) { /* other starts compete with walks, which have no crumples */
     ORB_TRY(orb_map_iron(c, l));
     orb_map_level_store(c, l, r);

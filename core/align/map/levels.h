@@ -28,10 +28,11 @@ void orb_map_level_store(orb_map_run *run, const orb_map_level *level, orb_refin
 ORB_MUST_CHECK orb_status orb_map_level_next(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
                                              unsigned char *known, double pull, int *has_room);
 
-/* Refines a level without flips up to all vertices. rough: only so far that samples of the map are useful. *failed: a
- * level has flips, covers the sphere twice, or leaves a vertex no room. */
+/* Refines a level without flips up to all vertices. pull: to the spatial targets; it falls from level to level and ends
+ * before the last. hold: what is left of it on every level, also on the last. rough: only so far that samples of the
+ * map are useful. *failed: a level has flips, covers the sphere twice, or leaves a vertex no room. */
 ORB_MUST_CHECK orb_status orb_map_levels_refine(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
-                                                double pull, int rough, int *failed);
+                                                double pull, double hold, int rough, int *failed);
 
 /* Stores a level without flips, refines it, and keeps the result as run->best if it is better. */
 ORB_MUST_CHECK orb_status orb_map_levels_finish(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,

@@ -10,9 +10,9 @@
  * If none of these gives such a map, samples of the targets guide landmark walks (walked.h). A walk begins without
  * flips and is optimised on a coarse level, so several are tried, and the best one is refined. Such shapes are of other
  * kinds, and a map of least energy shares a neck and a head out over a trunk by length alone; so all targets hold the
- * map, and no pass follows, which would let it go. If the caller says so, a
- * walk comes first, and replaces all starts: of 30 pairs of other kinds, it led to the map that was kept in 22. Or it
- * comes after the first start, if that leads to a poor map, and before further ones. */
+ * map, and no pass follows, which would let it go. If the caller says so, a walk comes first, and replaces all starts:
+ * of 30 pairs of other kinds, it led to the map that was kept in 22. Or it comes after the first start, if that leads
+ * to a poor map, and before further ones. */
 #include "align/map/targets.h"
 
 #include <math.h>

@@ -141,10 +141,7 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
 orb_status orb_map_walked_refine(orb_map_run *c, orb_map_walked *w) {
   int failed = 0;
   ORB_TRY(enter(c, w));
-  c->hold = w->hold;
-  const orb_status status = orb_map_levels_refine(c, w->refiner, &w->level, 0, 0, &failed);
-  c->hold = 0;
-  ORB_TRY(status);
+  ORB_TRY(orb_map_levels_refine(c, w->refiner, &w->level, 0, w->hold, 0, &failed));
   w->energy = failed ? INFINITY : orb_map_level_energy(&w->level);
   if (!failed) {
     c->best_energy = w->energy;

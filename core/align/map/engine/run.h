@@ -60,7 +60,6 @@ typedef struct orb_map_run {
   int samples_follow_target;      /* samples of a registration have their targets from there, not from the best map */
   int starts_smooth;              /* the first start from given targets has followed smoothed ones */
   double *target;                 /* spatial targets, once the moving shape is registered */
-  double hold;                    /* strength with which they pull on every level, also on the last; mostly 0 */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
   unsigned char *doubted;  /* vertices whose target_place faces another way: the first level of a start smooths them */
