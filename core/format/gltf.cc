@@ -178,8 +178,8 @@ struct Reader {
     materials.load(doc);
     build.by_vertex = 1;
     build.texcoords_v_down = 1;
-    const std::vector<Shown> shown = shown_meshes(doc, meshes.size());
-    std::vector<int64_t> first(meshes.size(), NONE);
+    const Counted<Shown> shown = shown_meshes(ctx, doc, meshes.size());
+    Counted<int64_t> first(meshes.size(), NONE, Charged<int64_t>(ctx));
     for (size_t i = 0; i < shown.size(); i++) {
       (void)element(meshes, shown[i].mesh, "mesh");
       int64_t &at = first[static_cast<size_t>(shown[i].mesh)];

@@ -25,13 +25,18 @@ struct Adder {
   cJSON *doc;
   const orb_additions &more;
   Editor editor;
-  std::set<size_t> meshes;   /* those on the surface */
-  std::vector<Block> blocks; /* of these meshes */
-  std::vector<size_t> twin;  /* per block: the first block with the same accessor of positions */
+  std::set<size_t> meshes; /* those on the surface */
+  Counted<Block> blocks;   /* of these meshes */
+  Counted<size_t> twin;    /* per block: the first block with the same accessor of positions */
 
   Adder(orb_context *context, const Document &document, Bytes first, const orb_additions &additions)
-      : ctx(context), doc(document.root()), more(additions), editor(context, document.root(), first) {
-    const std::vector<Block> all = blocks_of(doc);
+      : ctx(context),
+        doc(document.root()),
+        more(additions),
+        editor(context, document.root(), first),
+        blocks(Charged<Block>(context)),
+        twin(Charged<size_t>(context)) {
+    const Counted<Block> all = blocks_of(ctx, doc);
     for (const Block &block : all) {
       bool is_copy = block.first + static_cast<int64_t>(block.count) > more.vertex_count; /* of a mesh shown twice */
       for (size_t i = 0; i < block.count && !is_copy; i++) {

@@ -7,9 +7,9 @@ bool is_surface(const cJSON *primitive) {
   return mode >= 4 && mode <= 6 && member(member(primitive, "attributes"), "POSITION");
 }
 
-std::vector<Block> blocks_of(const cJSON *doc) {
+Counted<Block> blocks_of(orb_context *ctx, const cJSON *doc) {
   const List meshes = array_of(doc, "meshes"), accessors = array_of(doc, "accessors");
-  std::vector<Block> out;
+  Counted<Block> out{Charged<Block>(ctx)};
   int64_t next = 0;
   auto add = [&](size_t mesh, const Matrix &matrix) {
     for (const cJSON *primitive : array_of(meshes[mesh], "primitives")) {
@@ -25,8 +25,8 @@ std::vector<Block> blocks_of(const cJSON *doc) {
       }
     }
   };
-  const auto shown = shown_meshes(doc, meshes.size());
-  std::vector<const Matrix *> matrix(meshes.size(), nullptr);
+  const auto shown = shown_meshes(ctx, doc, meshes.size());
+  Counted<const Matrix *> matrix(meshes.size(), nullptr, Charged<const Matrix *>(ctx));
   std::vector<bool> again(shown.size(), false);
   for (size_t i = 0; i < shown.size(); i++) {
     (void)element(meshes, shown[i].mesh, "mesh");

@@ -17,7 +17,7 @@ struct Block {
 };
 
 /* All blocks, by their first vertex. */
-std::vector<Block> blocks_of(const cJSON *doc);
+Counted<Block> blocks_of(orb_context *ctx, const cJSON *doc);
 
 /* Whether the primitive consists of triangles with positions, so that its vertices have numbers. */
 bool is_surface(const cJSON *primitive);

@@ -16,25 +16,28 @@ namespace {
 
 const size_t TARGETS_A_CHECK = 4096; /* targets between two checks for cancellation */
 
+using Chosen = Counted<const Block *>;
+
 struct Given {
   orb_context *ctx;
   Document document;
   Buffers buffers;
   List meshes;
-  std::vector<Block> blocks;
+  Counted<Block> blocks;
 
   Given(orb_context *context, const unsigned char *bytes, size_t size)
       : ctx(context),
         document(context, bytes, size, size >= 4 && std::memcmp(bytes, "glTF", 4) == 0),
-        buffers(context) {
+        buffers(context),
+        blocks(Charged<Block>(context)) {
     buffers.load(document.root(), document.chunk(), size);
     meshes = array_of(document.root(), "meshes");
-    blocks = blocks_of(document.root());
+    blocks = blocks_of(ctx, document.root());
   }
 
   /* The blocks with vertices that count. */
-  std::vector<const Block *> used_blocks(const orb_given_file &file) const {
-    std::vector<const Block *> out;
+  Chosen used_blocks(const orb_given_file &file) const {
+    Chosen out{Charged<const Block *>(ctx)};
     for (const Block &block : blocks) {
       if (block.first + static_cast<int64_t>(block.count) > file.vertex_count) {
         malformed("The glTF file has more vertices than were read.");
@@ -107,15 +110,18 @@ Culprits mesh_and_nodes(const Given &given, size_t mesh) {
   const List nodes = array_of(given.document.root(), "nodes");
   for (size_t n = 0; n < nodes.size(); n++) {
     if (index_of(nodes[n], "mesh") == static_cast<int64_t>(mesh)) {
-      out.push_back(culprit("nodes", nodes, n));
+      out.add(culprit("nodes", nodes, n));
     }
   }
   return out;
 }
 
+/* Of each mesh its skin. */
+using Skins = std::map<size_t, int64_t, std::less<size_t>, Charged<std::pair<const size_t, int64_t>>>;
+
 /* The skin with which the nodes show each mesh that is used; NONE: without one. */
-std::map<size_t, int64_t> skins_of(const Given &given, const std::vector<const Block *> &used) {
-  std::map<size_t, int64_t> out;
+Skins skins_of(const Given &given, const Chosen &used) {
+  Skins out{Skins::allocator_type(given.ctx)};
   for (const Block *block : used) {
     out[block->mesh] = NONE;
   }
@@ -151,10 +157,10 @@ Culprits both(const Given &given, const Block &a, const Block &b) {
 }
 
 /* The blocks that are skinned; fills skin and place. */
-std::vector<const Block *> skinned_blocks(const Given &given, const orb_given_file &file, orb_given_skin *out) {
-  std::vector<const Block *> blocks;
-  const std::vector<const Block *> used = given.used_blocks(file);
-  const std::map<size_t, int64_t> skins = skins_of(given, used);
+Chosen skinned_blocks(const Given &given, const orb_given_file &file, orb_given_skin *out) {
+  Chosen blocks{Charged<const Block *>(given.ctx)};
+  const Chosen used = given.used_blocks(file);
+  const Skins skins = skins_of(given, used);
   for (const Block *block : used) {
     int64_t skin = skins.at(block->mesh);
     if (skin == NONE || !member(member(block->primitive, "attributes"), "JOINTS_0")) {
@@ -178,7 +184,7 @@ std::vector<const Block *> skinned_blocks(const Given &given, const orb_given_fi
   return blocks;
 }
 
-int32_t sets_of(const std::vector<const Block *> &blocks) {
+int32_t sets_of(const Chosen &blocks) {
   int32_t sets = 0;
   for (const Block *block : blocks) {
     int32_t n = 0;
@@ -208,7 +214,7 @@ void read_weights(const Given &given, const Block &block, int32_t set, orb_given
 }
 
 void read_skin(const Given &given, const orb_given_file &file, orb_given_skin *out) {
-  const std::vector<const Block *> blocks = skinned_blocks(given, file, out);
+  const Chosen blocks = skinned_blocks(given, file, out);
   if (blocks.empty()) {
     return;
   }
@@ -235,10 +241,10 @@ void read_skin(const Given &given, const orb_given_file &file, orb_given_skin *o
 }
 
 /* The names of the targets of a mesh that has `count`. */
-std::vector<std::string> target_names(const Given &given, size_t mesh, size_t count) {
+Counted<std::string> target_names(const Given &given, size_t mesh, size_t count) {
   const cJSON *list = member(member(given.meshes[mesh], "extras"), "targetNames");
   const cJSON *name = cJSON_IsArray(list) ? list->child : nullptr;
-  std::vector<std::string> out;
+  Counted<std::string> out{Charged<std::string>(given.ctx)};
   for (size_t k = 0; k < count; k++, name = name ? name->next : nullptr) {
     if (k % TARGETS_A_CHECK == 0) {
       must(orb_context_check(given.ctx));
@@ -281,7 +287,7 @@ void read_targets(const Given &given, const orb_given_file &file, orb_given_targ
   }
   for (const Block *block : given.used_blocks(file)) {
     const List targets = array_of(block->primitive, "targets");
-    const std::vector<std::string> names = target_names(given, block->mesh, targets.size());
+    const Counted<std::string> names = target_names(given, block->mesh, targets.size());
     for (size_t k = 0; k < targets.size(); k++) {
       if (k % TARGETS_A_CHECK == 0) {
         must(orb_context_check(given.ctx));
@@ -441,7 +447,7 @@ extern "C" orb_status orb_given_last_targets(orb_context *ctx, const unsigned ch
         continue;
       }
       int32_t all = static_cast<int32_t>(gltf::array_of(block.primitive, "targets").size());
-      const std::vector<std::string> found = gltf::target_names(given, block.mesh, static_cast<size_t>(all));
+      const gltf::Counted<std::string> found = gltf::target_names(given, block.mesh, static_cast<size_t>(all));
       for (int32_t k = 0; k < count && all >= count; k++) {
         (void)orb_utf8_copy(names[k], sizeof names[k], found[static_cast<size_t>(all - count + k)].c_str());
       }

@@ -66,14 +66,21 @@ struct Keeper {
   orb_gltf_kept *kept;
   List meshes;
   Buffers buffers;
-  std::vector<int32_t> first;  /* per mesh: the number of its first vertex */
-  std::vector<int32_t> showed; /* how often the scene shows it */
-  std::vector<Matrix> matrix;
+  Counted<int32_t> first;  /* per mesh: the number of its first vertex */
+  Counted<int32_t> showed; /* how often the scene shows it */
+  Counted<Matrix> matrix;
   std::map<size_t, int64_t> zeros; /* accessors of this many vertices that stay */
   Widened widened;
 
   Keeper(orb_context *context, cJSON *document, const orb_gltf_shapes &given, orb_gltf_kept *facts)
-      : ctx(context), doc(document), shapes(given), kept(facts), buffers(context) {}
+      : ctx(context),
+        doc(document),
+        shapes(given),
+        kept(facts),
+        buffers(context),
+        first(Charged<int32_t>(context)),
+        showed(Charged<int32_t>(context)),
+        matrix(Charged<Matrix>(context)) {}
 
   void drop(const std::string &what, const std::string &where, const char *why) const {
     must(orb_dropped_add(ctx, &kept->dropped, &kept->dropped_count, what.c_str(), where.c_str(), why));
@@ -107,7 +114,7 @@ struct Keeper {
 
   /* Numbers the vertices as the reader does. */
   void number() {
-    auto shown = shown_meshes(doc, meshes.size());
+    const Counted<Shown> shown = shown_meshes(ctx, doc, meshes.size());
     showed.assign(meshes.size(), 0);
     matrix.assign(meshes.size(), Matrix());
     for (const auto &[mesh, at, node] : shown) {
@@ -148,7 +155,7 @@ struct Keeper {
     const List nodes = array_of(doc, "nodes");
     for (size_t n = 0; n < nodes.size(); n++) {
       if (index_of(nodes[n], "mesh") == static_cast<int64_t>(mesh)) {
-        out.push_back(culprit("nodes", nodes, n));
+        out.add(culprit("nodes", nodes, n));
       }
     }
     return out;
@@ -174,13 +181,13 @@ struct Keeper {
     Culprits wrong;
     for (size_t m = 0; m < meshes.size(); m++) {
       if (is_on(first[m], size_of(m)) != named[m]) {
-        wrong.push_back(culprit("meshes", meshes, m));
+        wrong.add(culprit("meshes", meshes, m));
       }
     }
     if (!wrong.empty()) {
-      const std::string mesh = title(wrong[0].index);
+      const std::string mesh = title(wrong.kept()[0].index);
       throw Fault{ORB_E_BAD_OPTION,
-                  named[wrong[0].index]
+                  named[wrong.kept()[0].index]
                       ? "\"template\" names " + mesh +
                             ", but the closed surface has no vertex of it. Omit it, or upload the file with "
                             "part=NAME so that it is the surface."

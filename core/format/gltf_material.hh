@@ -15,7 +15,13 @@ class Materials {
  public:
   /* All must outlive this; the build may be freed before. file_size: bounds the size of all images together. */
   Materials(orb_context *ctx, orb_build *build, const Buffers *buffers, size_t file_size)
-      : ctx_(ctx), build_(build), buffers_(buffers), file_size_(file_size) {}
+      : ctx_(ctx),
+        build_(build),
+        buffers_(buffers),
+        file_size_(file_size),
+        sets_(Charged<int64_t>(ctx)),
+        image_number_(Charged<int32_t>(ctx)),
+        image_fault_(Charged<const char *>(ctx)) {}
   ~Materials();
   Materials(const Materials &) = delete;
   Materials &operator=(const Materials &) = delete;
@@ -60,13 +66,13 @@ class Materials {
   const Buffers *buffers_;
   size_t file_size_, image_bytes_ = 0;
   List images_, textures_, samplers_;
-  std::vector<int64_t> sets_;             /* of each material */
-  std::vector<orb_image> kept_;           /* owned: the context's memory, passed to the mesh or freed */
-  std::vector<int32_t> image_number_;     /* of each image of the file: its number in kept_; −1: not yet known */
-  std::vector<const char *> image_fault_; /* of each image: why it is omitted; NULL: it is not */
-  std::string where_;                     /* the present material */
-  std::vector<Value> values_;             /* of the present material */
-  int64_t set_ = 0;                       /* that the present material uses */
+  Counted<int64_t> sets_;             /* of each material */
+  std::vector<orb_image> kept_;       /* owned: the context's memory, passed to the mesh or freed */
+  Counted<int32_t> image_number_;     /* of each image of the file: its number in kept_; −1: not yet known */
+  Counted<const char *> image_fault_; /* of each image: why it is omitted; NULL: it is not */
+  std::string where_;                 /* the present material */
+  std::vector<Value> values_;         /* of the present material */
+  int64_t set_ = 0;                   /* that the present material uses */
 };
 
 }  // namespace gltf

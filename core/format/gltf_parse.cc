@@ -149,11 +149,8 @@ Bytes split_glb(const unsigned char *bytes, size_t size, Bytes *chunk, size_t *r
 /* Names the parts of the document in the error record. */
 void note(orb_context *ctx, const Culprits &culprits) {
   orb_error *error = orb_context_error_edit(ctx);
-  error->element_total = static_cast<int64_t>(culprits.size());
-  for (const Culprit &part : culprits) {
-    if (error->element_count == ORB_ERROR_ITEMS) {
-      break;
-    }
+  error->element_total = static_cast<int64_t>(culprits.total());
+  for (const Culprit &part : culprits.kept()) {
     orb_error_element *out = &error->elements[error->element_count++];
     if (part.index == NOWHERE) {
       std::snprintf(out->where, sizeof out->where, "%s", part.list.c_str());

@@ -53,53 +53,75 @@ int64_t number_of(const cJSON *value) {
   return static_cast<int64_t>(value->valuedouble);
 }
 
-std::vector<Shown> shown_meshes(const cJSON *doc, size_t mesh_count) {
-  const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");
-  std::vector<std::pair<int64_t, Matrix>> stack;
-  std::vector<Shown> out;
+namespace {
+
+/* A node to visit, and the place of the matrix above it in a list: each node with children has one there. */
+struct Waiting {
+  int64_t node;
+  size_t above;
+};
+
+/* The roots of the scene, or of all nodes where the document has no scenes. */
+Counted<int64_t> roots_of(orb_context *ctx, const cJSON *doc, const List &nodes, const List &scenes) {
+  Counted<int64_t> out{Charged<int64_t>(ctx)};
   if (!scenes.empty()) {
     const cJSON *scene = element(scenes, whole(doc, "scene", 0), "scene");
     for (const cJSON *root : array_of(scene, "nodes")) {
-      stack.emplace_back(number_of(root), Matrix());
+      out.push_back(number_of(root));
     }
-  } else if (!nodes.empty()) {
-    std::vector<bool> is_child(nodes.size(), false);
-    for (const cJSON *node : nodes) {
-      for (const cJSON *child : array_of(node, "children")) {
-        int64_t index = number_of(child);
-        if (index < static_cast<int64_t>(nodes.size())) {
-          is_child[static_cast<size_t>(index)] = true;
-        }
+    return out;
+  }
+  std::vector<bool> is_child(nodes.size(), false);
+  for (const cJSON *node : nodes) {
+    for (const cJSON *child : array_of(node, "children")) {
+      const int64_t index = number_of(child);
+      if (index < static_cast<int64_t>(nodes.size())) {
+        is_child[static_cast<size_t>(index)] = true;
       }
-    }
-    for (size_t i = 0; i < nodes.size(); i++) {
-      if (!is_child[i]) {
-        stack.emplace_back(static_cast<int64_t>(i), Matrix());
-      }
-    }
-  } else {
-    for (size_t i = 0; i < mesh_count; i++) {
-      out.push_back(Shown{static_cast<int64_t>(i), Matrix(), nullptr});
     }
   }
-  std::vector<bool> seen(nodes.size(), false);
-  std::reverse(stack.begin(), stack.end());
-  while (!stack.empty()) {
-    auto [index, above] = stack.back();
-    stack.pop_back();
-    const cJSON *node = element(nodes, index, "node");
-    if (seen[static_cast<size_t>(index)]) {
-      malformed("Node " + std::to_string(index) + " of the glTF file is a child of two nodes, or of itself.");
+  for (size_t i = 0; i < nodes.size(); i++) {
+    if (!is_child[i]) {
+      out.push_back(static_cast<int64_t>(i));
     }
-    seen[static_cast<size_t>(index)] = true;
-    Matrix matrix = above * matrix_of(node);
-    int64_t mesh = whole(node, "mesh", NONE);
+  }
+  return out;
+}
+
+}  // namespace
+
+Counted<Shown> shown_meshes(orb_context *ctx, const cJSON *doc, size_t mesh_count) {
+  const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");
+  Counted<Shown> out{Charged<Shown>(ctx)};
+  for (size_t i = 0; i < mesh_count && nodes.empty() && scenes.empty(); i++) {
+    out.push_back(Shown{static_cast<int64_t>(i), Matrix(), nullptr});
+  }
+  const Counted<int64_t> roots = roots_of(ctx, doc, nodes, scenes);
+  Counted<Waiting> stack{Charged<Waiting>(ctx)};
+  Counted<Matrix> above(1, Matrix(), Charged<Matrix>(ctx));
+  std::vector<bool> seen(nodes.size(), false);
+  for (size_t i = roots.size(); i-- > 0;) {
+    stack.push_back({roots[i], 0});
+  }
+  while (!stack.empty()) {
+    const Waiting at = stack.back();
+    stack.pop_back();
+    const cJSON *node = element(nodes, at.node, "node");
+    if (seen[static_cast<size_t>(at.node)]) {
+      malformed("Node " + std::to_string(at.node) + " of the glTF file is a child of two nodes, or of itself.");
+    }
+    seen[static_cast<size_t>(at.node)] = true;
+    const Matrix matrix = above[at.above] * matrix_of(node);
+    const int64_t mesh = whole(node, "mesh", NONE);
     if (mesh != NONE) {
       out.push_back(Shown{mesh, matrix, node});
     }
     const List children = array_of(node, "children");
+    if (!children.empty()) {
+      above.push_back(matrix);
+    }
     for (size_t i = children.size(); i-- > 0;) {
-      stack.emplace_back(number_of(children[i]), matrix);
+      stack.push_back({number_of(children[i]), above.size() - 1});
     }
   }
   return out;

@@ -65,7 +65,7 @@ struct Shown {
 
 /* Each node of the scene that shows a mesh, in depth-first order from the roots. Without nodes and scenes: each of the
  * mesh_count meshes once. */
-std::vector<Shown> shown_meshes(const cJSON *doc, size_t mesh_count);
+Counted<Shown> shown_meshes(orb_context *ctx, const cJSON *doc, size_t mesh_count);
 
 }  // namespace gltf
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstring>
+#include <initializer_list>
 #include <memory>
 #include <new>
 #include <string>
@@ -30,7 +31,29 @@ struct Culprit {
   size_t index;
   std::string name;
 };
-using Culprits = std::vector<Culprit>;
+
+/* The parts that a refusal names: all are counted, and the first ORB_ERROR_ITEMS kept. */
+class Culprits {
+ public:
+  Culprits() = default;
+  Culprits(std::initializer_list<Culprit> parts) {
+    for (const Culprit &part : parts) {
+      add(part);
+    }
+  }
+  void add(const Culprit &part) {
+    if (total_++ < ORB_ERROR_ITEMS) {
+      kept_.push_back(part);
+    }
+  }
+  bool empty() const { return total_ == 0; }
+  size_t total() const { return total_; }
+  const std::vector<Culprit> &kept() const { return kept_; }
+
+ private:
+  size_t total_ = 0;
+  std::vector<Culprit> kept_;
+};
 
 /* A document that is refused. */
 struct Fault {
@@ -94,7 +117,11 @@ struct Charged {
   bool operator!=(const Charged &other) const { return ctx != other.ctx; }
 };
 
-using Numbers = std::vector<double, Charged<double>>;
+/* A list whose memory counts. */
+template <typename T>
+using Counted = std::vector<T, Charged<T>>;
+
+using Numbers = Counted<double>;
 
 const int64_t NONE = -1;
 

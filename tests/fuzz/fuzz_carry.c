@@ -103,7 +103,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   if (size < 4 || orb_context_create(&options, &ctx) != ORB_OK) {
     return 0;
   }
-  const double began = fuzz_cpu_seconds();
+  const double began = fuzz_begin();
   orb_format format = memcmp(data, "glTF", 4) == 0 ? ORB_FORMAT_GLB : ORB_FORMAT_GLTF;
   if (data[0] == 0x89 || data[0] == 0xff) {
     if (orb_image_decode(ctx, data, size, &pixels) == ORB_OK) {

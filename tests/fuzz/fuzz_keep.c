@@ -70,7 +70,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   if (size < 1 || orb_context_create(&options, &ctx) != ORB_OK) {
     return 0;
   }
-  const double began = fuzz_cpu_seconds();
+  const double began = fuzz_begin();
   const uint8_t *bytes = data + 1;
   orb_format format = size > 4 && memcmp(bytes, "glTF", 4) == 0 ? ORB_FORMAT_GLB : ORB_FORMAT_GLTF;
   if (orb_mesh_read(ctx, bytes, size - 1, format, &mesh, NULL) == ORB_OK) {

@@ -70,7 +70,7 @@ static int fuzz(const uint8_t *data, size_t size) {
   }
   (void)orb_format_detect(data, size);
   orb_mesh mesh;
-  double began = fuzz_cpu_seconds();
+  double began = fuzz_begin();
   orb_status read = orb_mesh_read(ctx, data, size, FUZZ_FORMAT, &mesh, NULL);
   check_cost(ctx, size, multiples[FUZZ_FORMAT], 0, began, "reading");
   if (read == ORB_OK) {

@@ -108,7 +108,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   if (size < 1 || orb_context_create(&options, &ctx) != ORB_OK) {
     return 0;
   }
-  const double began = fuzz_cpu_seconds();
+  const double began = fuzz_begin();
   if (orb_mesh_read(ctx, data + 1, size - 1, ORB_FORMAT_GLB, &mesh, NULL) == ORB_OK) {
     keep(ctx, data + 1, size - 1, data[0], &mesh);
     orb_mesh_free(ctx, &mesh);
