@@ -268,6 +268,10 @@ test('the files for a cluster are valid and name options that the daemon has', (
     assert.equal(args[args.indexOf(option) + 1], `0.0.0.0:${ports[0].containerPort}`);
     assert.equal(annotations['prometheus.io/port'], `${ports[0].containerPort}`);
   }
+  // What comes from a registry is named by its digest; what deploy/image.sh builds is not there.
+  const foreign = [...walk(compose)].filter(([key, value]) => key === 'image' && value.includes('/'));
+  assert.ok(foreign.length >= 2);
+  for (const [, image] of foreign) assert.match(image, /^[^@]+:[^@]+@sha256:[0-9a-f]{64}$/);
   for (const variable of cluster('compose.yaml').matchAll(/\$\{([A-Z0-9_]+):\?/g))
     assert.match(cluster('example.env'), new RegExp(`^${variable[1]}=`, 'm'));
 });
