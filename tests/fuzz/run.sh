@@ -13,17 +13,26 @@
 #
 # Inputs that a run finds stay in build-fuzz/corpus/TARGET, and later runs use them. Inputs that crash, hang or leak are
 # kept in build-fuzz/found, and the script fails. Each target prints one line: executions, edges covered, time; the
-# same goes to build-fuzz/sums/TARGET. build-fuzz/results has a line "passed TARGET" or "failed TARGET" for each.
+# same goes to build-fuzz/sums/TARGET. build-fuzz/results has a line "passed TARGET", "failed TARGET" or "stopped TARGET"
+# for each: a run is stopped if a signal from outside ended it and it kept no input in build-fuzz/found. Its time and its
+# executions until then count, and the script fails, since the run is not complete.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
 all=(obj off ply stl 3mf gltf glb keep unpack carry json query range config sphere decode http token view client)
+
+# Whether a run with this exit status was stopped from outside: by SIGINT or SIGTERM, which libFuzzer turns into 72, or by
+# SIGHUP or SIGKILL; 130 and 143 are of a shell that was waiting. kept: its inputs in build-fuzz/found. In awk.
+is_stopped='function is_stopped(status, kept) { return kept + 0 == 0 && status ~ /^(72|129|130|137|143)$/ }'
 
 sums() {
   local name
   for name in "${all[@]}"; do
     if [ -f "build-fuzz/sums/$name" ]; then
-      awk -v name="$name" '{ wall += $1; cpu += $2; runs += $3; cov = $4; bad += $5 != 0 }
-        END { printf "%s: %.0f s wall, %.0f s CPU, %d executions, %s edges, %d runs that failed\n", name, wall, cpu, runs, cov, bad }' \
+      awk -v name="$name" "$is_stopped"'
+        NF == 4 { $5 = $4; $4 = 0 } # of earlier versions, without edges
+        NF >= 5 { wall += $1; cpu += $2; runs += $3; cov = $4 > 0 ? $4 : cov; if (is_stopped($5, $6)) stopped++; else bad += $5 != 0 }
+        END { printf "%s: %.0f s wall, %.0f s CPU, %d executions, %s edges, %d runs that failed, %d that were stopped\n",
+          name, wall, cpu, runs, cov, bad, stopped }' \
         "build-fuzz/sums/$name"
     fi
   done
@@ -65,8 +74,10 @@ cpu_of() {
 
 # Runs a target. When the time is up, SIGUSR1 makes the fuzzer end with its statistics.
 one() {
-  local name=$1 seconds=$2 unit=$3 log=build-fuzz/corpus/$1.log status=0 used limit=$2 fuzzer
+  local name=$1 seconds=$2 unit=$3 log=build-fuzz/corpus/$1.log began=build-fuzz/corpus/$1.began status=0 used=0 limit=$2
+  local fuzzer now runs cov kept times
   mkdir -p "build-fuzz/corpus/$name"
+  touch "$began"
   [ "$unit" = wall ] || limit=0
   TIMEFORMAT='%R s wall, %U s user, %S s system'
   { time {
@@ -74,20 +85,32 @@ one() {
         -timeout=$([ "$unit" = wall ] && echo 60 || echo 1200) -report_slow_units=1200 -print_final_stats=1 \
         -artifact_prefix="build-fuzz/found/$name-" "build-fuzz/corpus/$name" "build-fuzz/seeds/$name" &
       fuzzer=$!
+      trap 'kill $fuzzer 2>/dev/null' HUP INT TERM
       if [ "$unit" = cpu ]; then
-        while used=$(cpu_of $fuzzer) && [ "$used" -lt "$seconds" ]; do
+        while now=$(cpu_of $fuzzer) && [ "$now" -lt "$seconds" ]; do
+          used=$now
           sleep 1
         done
         kill -USR1 $fuzzer 2>/dev/null || true
       fi
       wait $fuzzer || status=$?
+      if kill -0 $fuzzer 2>/dev/null; then # a signal has interrupted the wait
+        status=0
+        wait $fuzzer || status=$?
+      fi
     }; } >"$log" 2>&1
-  local runs cov
-  runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
+  runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log" | tail -1)
+  runs=${runs:-$(sed -nE 's/^#([0-9]+).*/\1/p' "$log" | tail -1)} # of one that was killed: its last report
   cov=$(grep -oE 'cov: [0-9]+' "$log" | tail -1)
-  echo "fuzz $name: $runs executions, $cov, $(tail -1 "$log")"
-  tail -1 "$log" | awk -v runs="${runs:-0}" -v cov="${cov#cov: }" -v status=$status \
-    '{ print $1, $4 + $7, runs, cov, status }' >>"build-fuzz/sums/$name"
+  kept=$(find build-fuzz/found -name "$name-*" -newer "$began" | wc -l)
+  times=$(grep -E '^[0-9.]+ s wall, ' "$log" | tail -1)
+  echo "fuzz $name: $runs executions, $cov, $times"
+  awk -v runs="${runs:-0}" -v cov="${cov#cov: }" -v status=$status -v used="$used" -v kept="$kept" \
+    '{ cpu = $4 + $7; print $1, cpu < used ? used : cpu, runs, cov ? cov : 0, status, kept }' <<<"$times" >>"build-fuzz/sums/$name"
+  if awk "$is_stopped BEGIN { exit !is_stopped($status, $kept) }"; then
+    echo "stopped $name" >>build-fuzz/results
+    return 1
+  fi
   if [ $status -ne 0 ]; then
     echo "failed $name" >>build-fuzz/results
     tail -50 "$log"
@@ -150,4 +173,5 @@ if [ $unit = keep ]; then
   exit
 fi
 export -f one cpu_of
+export is_stopped
 printf '%s\n' "${targets[@]}" | xargs -P $(($(nproc) + 1)) -I{} bash -c "one {} $amount $unit"

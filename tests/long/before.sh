@@ -1,8 +1,9 @@
 #!/bin/bash
 # Runs tests of this version against the daemon of an older one, to see which of them fail there, and why.
 #   tests/long/before.sh PROGRAM TEST…      PROGRAM: the older orbmorphd
-# A test is a scenario, such as jobs, or a test of the studio, such as studio.first. For these the older daemon must have
-# been built with its studio. ORBMORPH: the command line, this version's by default.
+# A test is a scenario, such as jobs, a test of the studio, such as studio.first, or long.before: attacks by interfaces
+# that older daemons have too. For the studio the older daemon must have been built with its studio. ORBMORPH: the command
+# line, this version's by default.
 # Options that the older daemon does not know are omitted, with their values. Its address space is limited, since some
 # scenarios make it take all memory. ORB_BEFORE_TESTS: only tests whose names match. ORB_BEFORE_WAIT: seconds that a test
 # of the studio waits for what should come.
