@@ -315,7 +315,7 @@ static double stretch_of(const char *const file[2], const char *const truth[2]) 
       }
     }
   }
-  assert_int_equal(orb_hint_places_create(ctx, GIVEN, GIVEN, at, copy, &places), ORB_OK);
+  assert_int_equal(orb_hint_places_create(ctx, GIVEN, GIVEN, GIVEN, at, copy, &places), ORB_OK);
   assert_int_equal(orb_hint_stretch(ctx, &places, copy, &stretch), ORB_OK);
   orb_hint_places_free(ctx, &places);
   orb_coarse_copy_free(ctx, &copy[0]);

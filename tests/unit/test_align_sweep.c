@@ -150,8 +150,8 @@ static int64_t sweep(scene *s, const orb_map_rules *rules, int count) {
 /* The same sweep by the step of a single vertex; returns how many moved. */
 static int32_t sweep_singly(scene *s, const orb_map_rules *rules) {
   int32_t moved = 0;
-  for (int32_t i = 0; i < s->level.colour_start[s->level.colours]; i++) {
-    int32_t v = s->level.by_colour[i];
+  for (int32_t i = 0; i < s->level.moving; i++) {
+    int32_t v = s->level.by_group[i];
     s->level.moved[v] = orb_map_level_step(&s->level, &s->packed.b, rules, v);
     moved += s->level.moved[v] > 0;
   }
@@ -187,7 +187,7 @@ static void compare(const sweep_case *c, orb_cpu cpu, orb_mesh (*moving)(orb_con
   const orb_map_rules rules = rules_of(&one, c->soft, c->barrier);
   int32_t moved = sweep_singly(&one, &rules);
   assert_true(moved > a->count / 2);
-  assert_int_equal(sweep(&many, &rules, 1), a->colour_start[a->colours]);
+  assert_int_equal(sweep(&many, &rules, 1), a->moving);
   print_message("%s, %s: %d of %d moved, energy %.3f to %.3f\n", c->name, orb_map_loops_of(cpu)->name, moved, a->count,
                 before, orb_map_level_energy(b));
   assert_near(a->y, b->y, 3 * n);
@@ -222,7 +222,46 @@ static void test_same_as_single(void **unused) {
   orb_context_destroy(widest);
 }
 
-/* Colours have several chunks; vertices begin to wait. */
+/* Every vertex that moves is in one group, and no neighbours are in one. What sweeps of two parts move and read at once
+ * are different vertices: only the border lies between parts. */
+static void test_parts(void **unused) {
+  (void)unused;
+  orb_mesh (*const meshes[])(orb_context *) = {globe, small_ball, large_ball};
+  int32_t most = 0;
+  for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++) {
+    scene s;
+    make(&s, ORB_CPU_AUTO, 1, meshes[i], 0.01);
+    const orb_map_level *l = &s.level;
+    const int32_t groups = (l->parts + 1) * l->colours;
+    int32_t *group = malloc((size_t)l->count * sizeof *group), inside = 0;
+    assert_non_null(group);
+    memset(group, -1, (size_t)l->count * sizeof *group);
+    for (int32_t g = 0; g < groups; g++) {
+      for (int32_t k = l->group_start[g]; k < l->group_start[g + 1]; k++) {
+        assert_int_equal(group[l->by_group[k]], -1);
+        group[l->by_group[k]] = g;
+      }
+    }
+    for (int32_t v = 0; v < l->count; v++) {
+      assert_true((group[v] >= 0) == !l->pinned[v]);
+      const int32_t part = group[v] / l->colours;
+      inside += group[v] >= 0 && part < l->parts;
+      for (int32_t k = l->start[v]; k < l->start[v + 1] && group[v] >= 0; k++) {
+        const int32_t other = group[l->spoke[k].q], beside = other / l->colours;
+        assert_int_not_equal(group[v], other);
+        assert_true(other < 0 || part == beside || part == l->parts || beside == l->parts);
+      }
+    }
+    assert_true(inside > 3 * l->moving / 4); /* most of the work is done side by side */
+    most = l->parts > most ? l->parts : most;
+    print_message("%d vertices: %d parts, %d vertices between them\n", l->count, l->parts, l->moving - inside);
+    free(group);
+    drop(&s);
+  }
+  assert_true(most > 4);
+}
+
+/* The level has several parts; vertices begin to wait. */
 static void test_same_for_threads(void **unused) {
   (void)unused;
   double *first = NULL;
@@ -307,7 +346,8 @@ static void test_paths(void **unused) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_as_single), cmocka_unit_test(test_same_for_threads),
-                                     cmocka_unit_test(test_large_star), cmocka_unit_test(test_paths)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_as_single), cmocka_unit_test(test_parts),
+                                     cmocka_unit_test(test_same_for_threads), cmocka_unit_test(test_large_star),
+                                     cmocka_unit_test(test_paths)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 
 #include "align/find/crossed.h"
 #include "align/find/extended.h"
+#include "align/find/hinted.h"
 #include "align/find/raised.h"
 #include "align/find/tips.h"
 #include "align/rotate/procrustes.h"
@@ -153,8 +154,71 @@ static void best_trial_keeps_limbs(void **state) {
   scene_close(&s);
 }
 
+/* Gives the copies landmarks: the ends of the limbs, and where they leave the ball. Both creatures have vertices of the
+ * same numbers, so their landmarks are true. wrong: swaps the partners of the first two. */
+static void give_landmarks(scene *s, int wrong) {
+  enum { GIVEN = 2 * LIMBS };
+  orb_trials *t = &s->coarse;
+  int32_t vertex[GIVEN];
+  double *at[2];
+  for (int i = 0; i < LIMBS; i++) {
+    vertex[i] = shape_farthest(&s->mesh[0], limb[i]);
+    const double *p = s->mesh[0].positions + 3 * (size_t)vertex[i];
+    double least = INFINITY;
+    for (int32_t v = 0; v < s->mesh[0].vertex_count; v++) {
+      const double *q = s->mesh[0].positions + 3 * (size_t)v;
+      const double off = hypot(hypot(q[0] - p[0] / 2, q[1] - p[1] / 2), q[2] - p[2] / 2);
+      vertex[LIMBS + i] = off < least ? v : vertex[LIMBS + i];
+      least = fmin(off, least);
+    }
+  }
+  for (int k = 0; k < 2; k++) {
+    at[k] = orb_alloc(ctx, 3 * (size_t)GIVEN, sizeof(double));
+    assert_non_null(at[k]);
+    for (int i = 0; i < 3 * GIVEN; i++) {
+      const int own = wrong && k == 1 && i < 6 ? (i + 3) % 6 : i;
+      const double x = s->mesh[k].positions[3 * (size_t)vertex[own / 3] + (size_t)(own % 3)];
+      at[k][i] = (x - t->scaling[k].middle[i % 3]) * t->scaling[k].scale;
+    }
+  }
+  assert_int_equal(orb_hint_places_create(ctx, GIVEN, GIVEN, GIVEN, at, t->copy, &t->hint), ORB_OK);
+}
+
+/* The mean distance of the images of the first copy's vertices from their true places. */
+static double off_truth(const scene *s) {
+  const orb_trials *t = &s->coarse;
+  const orb_coarse_copy *copy = t->copy;
+  double sum = 0;
+  for (int32_t v = 0; v < copy[0].mesh.vertex_count; v++) {
+    const double *image = copy[1].mesh.positions + 3 * (size_t)t->trial[0].map[0].forth[v];
+    const double *truth = s->mesh[1].positions + 3 * (size_t)copy[0].vertex[v];
+    double d = 0;
+    for (int k = 0; k < 3; k++) {
+      d += pow(image[k] - (truth[k] - t->scaling[1].middle[k]) * t->scaling[1].scale, 2);
+    }
+    sum += sqrt(d) / copy[0].mesh.vertex_count;
+  }
+  return sum;
+}
+
+/* Landmarks tell where every place goes, even if two are swapped. */
+static void landmarks_make_a_trial(void **state) {
+  (void)state;
+  for (int wrong = 0; wrong < 2; wrong++) {
+    scene s;
+    scene_open(&s, alike);
+    give_landmarks(&s, wrong);
+    assert_int_equal(orb_trials_survey(&s.coarse, 0), ORB_OK);
+    assert_int_equal(orb_trials_make_hinted(&s.coarse), ORB_OK);
+    assert_int_equal(s.coarse.count, 1);
+    assert_true(off_truth(&s) < (wrong ? 0.4 : 0.2)); /* edges are 0.1 long; anywhere else it is 1 and more */
+    scene_close(&s);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_end_in_tips), cmocka_unit_test(tips_meet_their_partners),
-                                     cmocka_unit_test(best_trial_keeps_limbs)};
+                                     cmocka_unit_test(best_trial_keeps_limbs),
+                                     cmocka_unit_test(landmarks_make_a_trial)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -21,9 +21,9 @@ static int32_t nearest_vertex(const orb_mesh *mesh, const double at[3]) {
   return nearest;
 }
 
-orb_status orb_hint_places_create(orb_context *ctx, int32_t count, int32_t few, double *at[2],
+orb_status orb_hint_places_create(orb_context *ctx, int32_t count, int32_t few, int32_t trusted, double *at[2],
                                   const orb_coarse_copy copy[2], orb_hint_places *out) {
-  *out = (orb_hint_places){.count = count, .few = few, .at = {at[0], at[1]}};
+  *out = (orb_hint_places){.count = count, .few = few, .trusted = trusted, .at = {at[0], at[1]}};
   for (int s = 0; s < 2; s++) {
     out->vertex[s] = ORB_NEW(ctx, int32_t, count);
     if (!out->vertex[s] || !out->at[s]) {

@@ -9,6 +9,7 @@
 /* Vertices of the two given meshes that correspond. */
 typedef struct orb_match_hint {
   int32_t count, few; /* the first `few` of them exclude maps; all of them draw the best map to their partners */
+  int32_t trusted;    /* the first of them that may make a map: no soft ones, if there are enough others */
   const int32_t *first, *second;
   double stretch; /* orb_hint_stretch() above which the shapes are not one body in two poses */
   double sure;    /* orb_hint_stretch() up to which they are; between the two, the bend of the best match decides */
@@ -16,15 +17,15 @@ typedef struct orb_match_hint {
 
 /* The hint on scaled coarse copies of the shapes. */
 typedef struct orb_hint_places {
-  int32_t count, few;
+  int32_t count, few, trusted;
   int32_t *vertex[2]; /* the nearest vertex of the copy */
   double *at[2];      /* the landmark, in the copy's space */
 } orb_hint_places;
 
 /* Finds the places. at[2]: where the landmarks lie in the copies' spaces, 3 each; `out` takes ownership of both, also
- * on failure. few: as in orb_match_hint. Free `out` in any case. O(count · n). */
-ORB_MUST_CHECK orb_status orb_hint_places_create(orb_context *ctx, int32_t count, int32_t few, double *at[2],
-                                                 const orb_coarse_copy copy[2], orb_hint_places *out);
+ * on failure. few, trusted: as in orb_match_hint. Free `out` in any case. O(count · n). */
+ORB_MUST_CHECK orb_status orb_hint_places_create(orb_context *ctx, int32_t count, int32_t few, int32_t trusted,
+                                                 double *at[2], const orb_coarse_copy copy[2], orb_hint_places *out);
 void orb_hint_places_free(orb_context *ctx, orb_hint_places *places);
 
 /* The landmarks as anchors of a copy of the second shape, of any size, on the first one. The caller frees them. O(count

@@ -5,6 +5,7 @@
 
 #include "align/find/crossed.h"
 #include "align/find/extended.h"
+#include "align/find/hinted.h"
 #include "align/find/mirrored.h"
 #include "align/find/params.h"
 #include "align/find/raised.h"
@@ -161,7 +162,7 @@ static double roundness(const orb_mesh *copy) {
 /* Places the landmarks on the copies. *stretch: see orb_hint_stretch(). */
 static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *stretch) {
   double *at[2];
-  int32_t count = 0, few = 0;
+  int32_t count = 0, few = 0, trusted = 0;
   for (int s = 0; s < 2; s++) {
     at[s] = ORB_NEW(t->ctx, double, 3 * (size_t)hint->count);
   }
@@ -177,8 +178,9 @@ static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *s
     }
     count++;
     few += i < hint->few;
+    trusted += i < hint->trusted;
   }
-  ORB_TRY(orb_hint_places_create(t->ctx, count, few, at, t->copy, &t->hint));
+  ORB_TRY(orb_hint_places_create(t->ctx, count, few, trusted, at, t->copy, &t->hint));
   return orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch);
 }
 
@@ -239,7 +241,15 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   if (hint && !(stretch <= hint->stretch)) {
     return ORB_OK;
   }
-  ORB_TRY(fill_trials(t));
+  double bend;
+  ORB_TRY(orb_trials_try_hinted(t, &bend));
+  if (hint && stretch > hint->sure && isfinite(bend) && bend > ORB_FIND_HINTED_UNLIKE) {
+    out->is_unsure = 1;
+    return ORB_OK;
+  }
+  if (t->count == 0) {
+    ORB_TRY(fill_trials(t));
+  }
   int32_t best = orb_trials_best(t);
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
     return ORB_OK;

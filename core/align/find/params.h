@@ -252,6 +252,20 @@ static const double ORB_FIND_HINT_OFF = 0.5;
  * to 0.5, the best one at 0.16 to 0.3, and others at up to 3. */
 static const double ORB_FIND_HINT_ROUGH = 2;
 
+/* The trial that landmarks make (hinted.c). */
+
+enum {
+  ORB_FIND_HINTED_LEAST = 8, /* landmarks: with fewer, too many places are as far from all of them */
+  ORB_FIND_HINTED_MOST =
+      24, /* that are used, a multiple of 4: 48 million differences for two copies of 1,000 vertices */
+  ORB_FIND_HINTED_AGAIN = 2 /* registrations after the first: a third one more changes little */
+};
+/* A difference of distances counts relative to the distance and this length. In radii of a ball of the shape's area. */
+static const double ORB_FIND_HINTED_NEAR = 0.5;
+/* It is taken without a search if it bends the shapes by at most BEND. If it bends them by more than UNLIKE, no match
+ * bends them by ORB_FIND_HINT_BEND or less: those of a search bend 13 pairs 0.8 to 1.1 times as much. */
+static const double ORB_FIND_HINTED_BEND = 0.15, ORB_FIND_HINTED_UNLIKE = 0.2;
+
 /* If landmarks bend a pose more than this many times as much as it bends without them, they have twisted it. In 77
  * comparisons of people, with 8 and 24 landmarks, they bent it 0.7 to 1.4 times as much, or 6.6 times and more. */
 static const double ORB_FIND_DRAWN_BEND = 2;

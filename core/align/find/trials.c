@@ -66,7 +66,7 @@ static orb_status copy_hint(const orb_trials *coarse, orb_trials *small) {
       memcpy(at[s], from->at[s], count * sizeof(double));
     }
   }
-  return orb_hint_places_create(small->ctx, from->count, from->few, at, small->copy, &small->hint);
+  return orb_hint_places_create(small->ctx, from->count, from->few, from->trusted, at, small->copy, &small->hint);
 }
 
 orb_status orb_trials_open_small(const orb_trials *coarse, orb_trials *small) {

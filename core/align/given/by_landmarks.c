@@ -139,6 +139,7 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
   const int32_t spread = exact >= ORB_FIND_HINT_LEAST ? exact : count;
   ORB_GO(status, spread_landmarks(ctx, fixed->mesh.positions, spread, vertex), done);
   const orb_match_hint hint = {.count = count,
+                               .trusted = spread,
                                .few = spread < ORB_FIND_HINT_FEW ? spread : ORB_FIND_HINT_FEW,
                                .first = vertex[0],
                                .second = vertex[1],

@@ -153,17 +153,31 @@ static int is_held(const orb_map_run *c) {
   return c->pairs.landmarks > 0 && c->best_energy <= c->params.targets.hopeless;
 }
 
-/* Continues from the first start, until there is a map of shapes that correspond, or the rival has a better one. */
+/* Asks the rival whether the best map is worth more work. */
+static orb_status ask_rival(orb_map_run *c) {
+  int goes_on;
+  ORB_TRY(c->rival.ask(c->rival.user, c->best_energy, &goes_on));
+  c->course.is_beaten = !goes_on;
+  return ORB_OK;
+}
+
+/* Continues from the first start, until there is a map of shapes that correspond, or the rival has a better one. A poor
+ * first map is mostly beaten, so the rival is asked before it is drawn. */
 static orb_status run_starts(orb_map_run *c) {
   const orb_map_params *p = &c->params;
+  const int asks_first = c->rival.ask && c->best_energy > p->energy.poor;
+  if (asks_first) {
+    ORB_TRY(ask_rival(c));
+    if (c->course.is_beaten) {
+      return ORB_OK;
+    }
+  }
   if (c->best_energy > smooth_energy(c) && c->best_energy <= p->targets.crumpled) {
     ORB_TRY(draw(c));
   }
-  if (c->rival.ask && c->best_energy > p->energy.good) {
-    int goes_on;
-    ORB_TRY(c->rival.ask(c->rival.user, c->best_energy, &goes_on));
-    c->course.is_beaten = !goes_on;
-    if (!goes_on) {
+  if (c->rival.ask && !asks_first && c->best_energy > p->energy.good) {
+    ORB_TRY(ask_rival(c));
+    if (c->course.is_beaten) {
       return ORB_OK;
     }
   }

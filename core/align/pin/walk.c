@@ -16,6 +16,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 #include "embed/newton/advance.h"
 #include "numeric/vec3.h"
 
@@ -339,81 +340,123 @@ static orb_status hand_over(walker *w, orb_walk_level *out) {
   return ORB_OK;
 }
 
-/* Refines all walked shapes, into points[s] of its own each, except one whose level is handed over. *good: all results
- * are certified. Frees the walkers. */
-static orb_status finish_all(orb_context *ctx, walker *walkers, const orb_sheet *sheets, int32_t shape_count,
-                             orb_walk_level *last, double **points, int *good) {
-  *good = 1;
-  for (int32_t s = 0; s < shape_count && *good; s++) {
-    if (last && s == shape_count - 1) {
-      ORB_TRY(hand_over(&walkers[s], last));
-      continue;
+/* A walk of all shapes, which do each stage side by side. */
+typedef struct company {
+  orb_sheet *sheets;
+  const int32_t *landmarks;
+  int32_t count, shape_count;
+  const orb_walk_options *options;
+  orb_walk_level *last;
+  double *targets;
+  walker *walkers; /* of each shape, as what follows */
+  double **points; /* where it stands at last, except one whose level is handed over */
+  int32_t *left;   /* landmarks that have not arrived */
+  int *good;       /* is certified */
+} company;
+
+static orb_status create_one(orb_context *ctx, void *arg, int32_t s) {
+  const company *all = arg;
+  return walker_create(ctx, &all->sheets[s], all->landmarks, all->count, all->options, &all->walkers[s]);
+}
+
+static orb_status walk_one(orb_context *ctx, void *arg, int32_t s) {
+  const company *all = arg;
+  all->walkers[s].ctx = ctx;
+  return walk(&all->walkers[s], all->targets, &all->left[s]);
+}
+
+static orb_status finish_one(orb_context *ctx, void *arg, int32_t s) {
+  const company *all = arg;
+  walker *w = &all->walkers[s];
+  w->ctx = ctx;
+  if (all->last && s == all->shape_count - 1) {
+    all->good[s] = 1;
+    return hand_over(w, all->last);
+  }
+  all->points[s] = ORB_NEW(ctx, double, 3 * (size_t)all->sheets[s].vertex_capacity);
+  if (!all->points[s]) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_status status = finish(ctx, w, all->points[s], &all->good[s]);
+  walker_free(w);
+  return status;
+}
+
+/* Runs a stage for all shapes. Tasks have contexts of their own, which end with them. */
+static orb_status run_stage(orb_context *ctx, company *all, orb_task_fn stage, double done) {
+  orb_status status = orb_tasks_run(ctx, all->shape_count, stage, all);
+  for (int32_t s = 0; s < all->shape_count; s++) {
+    all->walkers[s].ctx = all->walkers[s].ctx ? ctx : NULL;
+  }
+  orb_progress(ctx, "align", done);
+  return status;
+}
+
+/* *stuck stays 1 if the landmarks cannot meet. */
+static orb_status walk_together(orb_context *ctx, company *all, int *stuck) {
+  ORB_TRY(run_stage(ctx, all, create_one, 0.3));
+  for (int32_t s = 0; s < all->shape_count; s++) {
+    if (!all_live(&all->walkers[s])) {
+      return ORB_OK;
     }
-    points[s] = ORB_NEW(ctx, double, 3 * (size_t)sheets[s].vertex_capacity);
-    if (!points[s]) {
-      return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(gather(ctx, all->walkers, all->shape_count, all->count, all->targets));
+  if (!targets_apart(all->targets, all->count)) {
+    return ORB_OK;
+  }
+  ORB_TRY(run_stage(ctx, all, walk_one, 0.5));
+  for (int32_t s = 0; s < all->shape_count; s++) {
+    if (all->left[s] > 0) {
+      return ORB_OK;
     }
-    ORB_TRY(finish(ctx, &walkers[s], points[s], good));
-    walker_free(&walkers[s]);
-    orb_progress(ctx, "align", 0.4 + 0.6 * (s + 1) / shape_count);
+  }
+  ORB_TRY(run_stage(ctx, all, finish_one, 1));
+  *stuck = 0;
+  for (int32_t s = 0; s < all->shape_count; s++) {
+    *stuck |= !all->good[s];
+  }
+  for (int32_t s = 0; s < all->shape_count - (all->last != NULL) && !*stuck; s++) {
+    double *old = all->sheets[s].shape.points;
+    all->sheets[s].shape.points = all->points[s];
+    all->points[s] = old;
   }
   return ORB_OK;
 }
 
 orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                         int32_t count, const orb_walk_options *options, orb_walk_level *last, int *stuck) {
-  orb_status status = ORB_OK;
-  walker *walkers = ORB_NEW0(ctx, walker, shape_count);
-  double *targets = ORB_NEW(ctx, double, 3 * (size_t)count), **points = ORB_NEW0(ctx, double *, shape_count);
+  company all = {.sheets = sheets,
+                 .landmarks = landmarks,
+                 .count = count,
+                 .shape_count = shape_count,
+                 .options = options,
+                 .last = last,
+                 .targets = ORB_NEW(ctx, double, 3 * (size_t)count),
+                 .walkers = ORB_NEW0(ctx, walker, shape_count),
+                 .points = ORB_NEW0(ctx, double *, shape_count),
+                 .left = ORB_NEW0(ctx, int32_t, shape_count),
+                 .good = ORB_NEW0(ctx, int, shape_count)};
   *stuck = 1;
-  if (!walkers || !targets || !points) {
-    status = ORB_E_NO_MEMORY;
-    goto end;
+  orb_status status = ORB_E_NO_MEMORY;
+  if (all.walkers && all.targets && all.points && all.left && all.good) {
+    status = walk_together(ctx, &all, stuck);
   }
-  for (int32_t s = 0; s < shape_count; s++) {
-    ORB_GO(status, walker_create(ctx, &sheets[s], landmarks, count, options, &walkers[s]), end);
-    if (!all_live(&walkers[s])) {
-      goto end;
-    }
-    orb_progress(ctx, "align", 0.4 * (s + 1) / shape_count);
-  }
-  ORB_GO(status, gather(ctx, walkers, shape_count, count, targets), end);
-  if (!targets_apart(targets, count)) {
-    goto end;
-  }
-  for (int32_t s = 0; s < shape_count; s++) {
-    int32_t left = 0;
-    ORB_GO(status, walk(&walkers[s], targets, &left), end);
-    if (left > 0) {
-      goto end;
-    }
-  }
-  int good;
-  ORB_GO(status, finish_all(ctx, walkers, sheets, shape_count, last, points, &good), end);
-  if (!good) {
-    goto end;
-  }
-  for (int32_t s = 0; s < shape_count - (last != NULL); s++) {
-    double *old = sheets[s].shape.points;
-    sheets[s].shape.points = points[s];
-    points[s] = old;
-  }
-  *stuck = 0;
-end:
   if (status == ORB_E_NOT_CERTIFIED) { /* pinned landmarks left a vertex no room: the walk is stuck */
     orb_error_clear(ctx);
     status = ORB_OK;
   }
   for (int32_t s = 0; s < shape_count; s++) {
-    if (walkers) {
-      walker_free(&walkers[s]);
+    if (all.walkers) {
+      walker_free(&all.walkers[s]);
     }
-    if (points) {
-      orb_free(ctx, points[s]);
+    if (all.points) {
+      orb_free(ctx, all.points[s]);
     }
   }
-  orb_free(ctx, walkers);
-  orb_free(ctx, targets);
-  orb_free(ctx, points);
+  orb_free(ctx, all.walkers);
+  orb_free(ctx, all.targets);
+  orb_free(ctx, all.points);
+  orb_free(ctx, all.left);
+  orb_free(ctx, all.good);
   return status;
 }

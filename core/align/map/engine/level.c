@@ -13,6 +13,11 @@
 /* Of the mean edge: added to the mean edge of each triangle, so that the slack of a point is above 0. */
 static const double MEAN_SHARE = 1e-3;
 enum { LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 }; /* vertices between checks for cancellation, and of one task */
+enum {
+  PART_LEAST = 500, /* vertices of a part; with half as many, a colour of a part often fills no vector, and sweeps take
+                       a tenth more processor time */
+  PARTS_MOST = 64   /* as many as threads; a power of two, since most machines have an even number of threads */
+};
 
 void orb_map_level_free(orb_context *ctx, orb_map_level *l) {
   orb_free(ctx, l->vertex);
@@ -23,8 +28,8 @@ void orb_map_level_free(orb_context *ctx, orb_map_level *l) {
   orb_free(ctx, l->y);
   orb_free(ctx, l->pull);
   orb_free(ctx, l->pinned);
-  orb_free(ctx, l->colour_start);
-  orb_free(ctx, l->by_colour);
+  orb_free(ctx, l->group_start);
+  orb_free(ctx, l->by_group);
   memset(l, 0, sizeof *l);
 }
 
@@ -38,10 +43,9 @@ static orb_status reserve(orb_context *ctx, orb_map_level *l) {
   l->y = ORB_NEW0(ctx, double, 15 * n);
   l->pull = ORB_NEW0(ctx, double, n);
   l->pinned = ORB_NEW0(ctx, unsigned char, n);
-  l->colour_start = ORB_NEW0(ctx, int32_t, ORB_MAP_COLOURS + 1);
-  l->by_colour = ORB_NEW(ctx, int32_t, n);
+  l->by_group = ORB_NEW(ctx, int32_t, n);
   if (!l->vertex || !l->start || !l->spoke || !l->triangle || !l->place || !l->y || !l->pull || !l->pinned ||
-      !l->colour_start || !l->by_colour) {
+      !l->by_group) {
     return ORB_E_NO_MEMORY;
   }
   l->n = l->y + 3 * n;
@@ -145,36 +149,75 @@ static void fill_spokes(orb_map_level *l, const double *shape) {
 }
 
 /* Greedy colours, so that neighbours never move at once. Vertices that get no colour do not move. */
-static orb_status fill_colours(orb_context *ctx, orb_map_level *l) {
-  signed char *colour = ORB_NEW(ctx, signed char, l->count);
-  if (!colour) {
-    return ORB_E_NO_MEMORY;
-  }
-  memset(colour, -1, (size_t)l->count);
-  int32_t count[ORB_MAP_COLOURS] = {0};
+static void choose_colours(orb_map_level *l, signed char *colour) {
   for (int32_t v = 0; v < l->count; v++) {
     uint64_t used = 0;
     for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
-      int c = colour[l->spoke[i].q];
+      const int32_t q = l->spoke[i].q, c = q < v ? colour[q] : -1;
       used |= c >= 0 ? (uint64_t)1 << c : 0;
     }
+    colour[v] = -1;
     if (!l->pinned[v] && ~used) {
       colour[v] = (signed char)__builtin_ctzll(~used);
-      count[colour[v]]++;
+      l->colours = colour[v] + 1 > l->colours ? colour[v] + 1 : l->colours;
     }
   }
-  for (int c = 0; c < ORB_MAP_COLOURS; c++) {
-    l->colour_start[c + 1] = l->colour_start[c] + count[c];
-    l->colours = count[c] ? c + 1 : l->colours;
-    count[c] = l->colour_start[c];
+}
+
+/* Vertices are numbered along a curve that fills the surface, so ranges of numbers are parts of it. The border is what
+ * keeps the rest of the parts apart, and all vertices with many spokes, which sweeps step one by one. */
+static void choose_parts(orb_map_level *l, int32_t *part) {
+  for (l->parts = 1; l->parts < PARTS_MOST && l->count / (2 * l->parts) >= PART_LEAST;) {
+    l->parts *= 2;
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    const int32_t own = (int32_t)((int64_t)v * l->parts / l->count);
+    int is_border = l->start[v + 1] - l->start[v] > ORB_MAP_STEP_RING_MAX;
+    for (int32_t i = l->start[v]; i < l->start[v + 1] && !is_border; i++) {
+      const int32_t q = l->spoke[i].q;
+      is_border = q < v && part[q] != own && part[q] != l->parts;
+    }
+    part[v] = is_border ? l->parts : own;
+  }
+}
+
+static orb_status fill_groups(orb_context *ctx, orb_map_level *l) {
+  orb_status status = ORB_E_NO_MEMORY;
+  signed char *colour = ORB_NEW(ctx, signed char, l->count);
+  int32_t *part = ORB_NEW(ctx, int32_t, l->count), *start;
+  if (!colour || !part) {
+    goto done;
+  }
+  choose_colours(l, colour);
+  choose_parts(l, part);
+  const size_t groups = (size_t)(l->parts + 1) * (size_t)l->colours;
+  start = l->group_start = ORB_NEW0(ctx, int32_t, groups + 1);
+  if (!start) {
+    goto done;
   }
   for (int32_t v = 0; v < l->count; v++) {
     if (colour[v] >= 0) {
-      l->by_colour[count[(int)colour[v]]++] = v;
+      start[part[v] * l->colours + colour[v] + 1]++;
     }
   }
+  for (size_t g = 0; g < groups; g++) {
+    start[g + 1] += start[g];
+  }
+  l->moving = start[groups];
+  for (int32_t v = l->count; v-- > 0;) { /* from behind: start[g + 1] falls to where group g begins */
+    if (colour[v] >= 0) {
+      l->by_group[--start[part[v] * l->colours + colour[v] + 1]] = v;
+    }
+  }
+  for (size_t g = 0; g < groups; g++) {
+    start[g] = start[g + 1];
+  }
+  start[groups] = l->moving;
+  status = ORB_OK;
+done:
   orb_free(ctx, colour);
-  return ORB_OK;
+  orb_free(ctx, part);
+  return status;
 }
 
 /* Numbers the live vertices, and lists each live triangle once: at the corner of its lowest vertex. */
@@ -221,7 +264,7 @@ orb_status orb_map_level_create(orb_context *ctx, const orb_map_params *params, 
   gather(&l, s, alive, pinned);
   fill_triangles(&l, position, shape);
   fill_spokes(&l, shape);
-  status = fill_colours(ctx, &l);
+  status = fill_groups(ctx, &l);
 done:
   orb_free(ctx, shape);
   if (status == ORB_OK) {

@@ -1,8 +1,10 @@
 /* Sweeps of a level by the vector loops: what steps read is laid out once for all sweeps of a round.
  *
- * A sweep goes from colour to colour. No two vertices of a colour are neighbours, so their steps are independent: the
- * stirred ones, near which something has moved, are listed first and stepped then, both in parallel. The list has the
- * same order for any number of threads, so the batches and the results are the same. */
+ * A sweep goes through the parts of the level, which run side by side, and then through the border between them. So
+ * threads wait for each other twice a sweep, not after each colour, which took longer than the steps of a colour of a
+ * small level. Each part, and the border, goes from colour to colour. No two vertices of a colour are neighbours, so
+ * their steps are independent: the stirred ones, near which something has moved, are listed first and stepped then.
+ * Parts and lists are the same for any number of threads, and so are the results. */
 #include "align/map/engine/sweep.h"
 
 #include <string.h>
@@ -14,15 +16,14 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { LIST_GRAIN = 1024, STEP_GRAIN = 32 }; /* vertices of a chunk; the latter is a multiple of all lanes */
+enum { STEP_GRAIN = 32 }; /* vertices of a chunk: a multiple of all lanes */
 
 typedef struct sweep_run {
   const orb_map_loops *loops;
   orb_map_step_job job;
-  int32_t *large; /* where by_colour has vertices with more than ORB_MAP_STEP_RING_MAX spokes */
+  int32_t *large; /* where by_group has vertices with more than ORB_MAP_STEP_RING_MAX spokes: in the border */
   int32_t large_count;
-  int32_t first;   /* of the vertices of a colour in by_colour */
-  int32_t *listed; /* of each chunk of them: how many are stirred. These begin the chunk's part of the list */
+  int32_t *stepped; /* vertices of each part, in this sweep */
 } sweep_run;
 
 static void run_free(orb_context *ctx, sweep_run *s) {
@@ -33,7 +34,7 @@ static void run_free(orb_context *ctx, sweep_run *s) {
   orb_free(ctx, s->job.list);
   orb_free(ctx, s->job.spoke);
   orb_free(ctx, s->large);
-  orb_free(ctx, s->listed);
+  orb_free(ctx, s->stepped);
 }
 
 static void put_vertex(const orb_map_step_job *j, int32_t v) {
@@ -77,8 +78,8 @@ static void fill(sweep_run *s) {
     j->ring[i] = from->q;
     memcpy(j->spoke + 4 * i, shape, sizeof shape);
   }
-  for (int32_t i = 0; i < l->colour_start[l->colours]; i++) {
-    if (valence(l, l->by_colour[i]) > ORB_MAP_STEP_RING_MAX) {
+  for (int32_t i = l->group_start[l->parts * l->colours]; i < l->moving; i++) {
+    if (valence(l, l->by_group[i]) > ORB_MAP_STEP_RING_MAX) {
       s->large[s->large_count++] = i;
     }
   }
@@ -94,9 +95,9 @@ static orb_status reserve(orb_context *ctx, sweep_run *s) {
   j->list = ORB_NEW(ctx, int32_t, n);
   j->spoke = ORB_NEW(ctx, float, 4 * m);
   s->large = ORB_NEW(ctx, int32_t, m / ORB_MAP_STEP_RING_MAX);
-  s->listed = ORB_NEW(ctx, int32_t, n / LIST_GRAIN + 1);
-  return j->row && j->at && j->triangle && j->ring && j->list && j->spoke && s->large && s->listed ? ORB_OK
-                                                                                                   : ORB_E_NO_MEMORY;
+  s->stepped = ORB_NEW(ctx, int32_t, j->level->parts);
+  return j->row && j->at && j->triangle && j->ring && j->list && j->spoke && s->large && s->stepped ? ORB_OK
+                                                                                                    : ORB_E_NO_MEMORY;
 }
 
 /* Has anything around v moved since v was last optimal? Vertices that were pinned after the level was made have a
@@ -113,37 +114,38 @@ static int is_stirred(const orb_map_step_job *j, int32_t v) {
   return stirred;
 }
 
-static void list_chunk(void *arg, int64_t begin, int64_t end, int thread) {
-  const sweep_run *s = arg;
-  orb_map_level *l = s->job.level;
-  int32_t *list = s->job.list + begin, count = 0;
-  (void)thread;
-  for (int64_t i = begin; i < end; i++) {
-    int32_t v = l->by_colour[s->first + i];
+/* Lists those of group g that are stirred and have few spokes, from `list` on; returns how many. */
+static int32_t list_group(const orb_map_step_job *j, int32_t g, int32_t *list) {
+  orb_map_level *l = j->level;
+  int32_t count = 0;
+  for (int32_t i = l->group_start[g]; i < l->group_start[g + 1]; i++) {
+    const int32_t v = l->by_group[i];
     if (valence(l, v) > ORB_MAP_STEP_RING_MAX) {
       continue;
     }
-    if (is_stirred(&s->job, v)) {
+    if (is_stirred(j, v)) {
       list[count++] = v;
     } else {
       l->moved[v] = 0;
     }
   }
-  s->listed[begin / LIST_GRAIN] = count;
+  return count;
 }
 
-/* Lists the stirred vertices of colour c; returns how many. */
-static int32_t list_colour(orb_context *ctx, sweep_run *s, int c) {
+/* Sweeps parts. Each has its own stretch of the list. */
+static void sweep_parts(void *arg, int64_t begin, int64_t end, int thread) {
+  const sweep_run *s = arg;
   const orb_map_level *l = s->job.level;
-  int32_t total = 0, count = l->colour_start[c + 1] - l->colour_start[c], *list = s->job.list;
-  s->first = l->colour_start[c];
-  orb_parallel_for(ctx, count, LIST_GRAIN, list_chunk, s);
-  for (int32_t begin = 0; begin < count; begin += LIST_GRAIN) {
-    int32_t listed = s->listed[begin / LIST_GRAIN];
-    memmove(list + total, list + begin, (size_t)listed * sizeof *list);
-    total += listed;
+  (void)thread;
+  for (int32_t part = (int32_t)begin; part < end; part++) {
+    const int32_t first = l->group_start[part * l->colours];
+    s->stepped[part] = 0;
+    for (int32_t c = 0; c < l->colours; c++) {
+      const int32_t count = list_group(&s->job, part * l->colours + c, s->job.list + first);
+      s->loops->steps(&s->job, first, first + count);
+      s->stepped[part] += count;
+    }
   }
-  return total;
 }
 
 static void step_chunk(void *arg, int64_t begin, int64_t end, int thread) {
@@ -163,19 +165,34 @@ static void step_large(const orb_map_step_job *j, int32_t v) {
   put_vertex(j, v);
 }
 
-/* Returns the number of steps. next: of s->large, the first that is not yet swept. */
-static int32_t sweep_colour(orb_context *ctx, sweep_run *s, int c, int32_t *next) {
+/* Sweeps colour c of the border; returns the number of steps. next: of s->large, the first that is not yet swept. */
+static int32_t sweep_border(orb_context *ctx, sweep_run *s, int32_t c, int32_t *next) {
   orb_map_level *l = s->job.level;
-  int32_t stepped = list_colour(ctx, s, c);
+  const int32_t g = l->parts * l->colours + c;
+  int32_t stepped = list_group(&s->job, g, s->job.list);
   orb_parallel_for(ctx, stepped, STEP_GRAIN, step_chunk, s);
-  for (; *next < s->large_count && s->large[*next] < l->colour_start[c + 1]; (*next)++) {
-    int32_t v = l->by_colour[s->large[*next]];
+  for (; *next < s->large_count && s->large[*next] < l->group_start[g + 1]; (*next)++) {
+    int32_t v = l->by_group[s->large[*next]];
     if (is_stirred(&s->job, v)) {
       step_large(&s->job, v);
       stepped++;
     } else {
       l->moved[v] = 0;
     }
+  }
+  return stepped;
+}
+
+/* One sweep; returns the number of steps. */
+static int32_t sweep_once(orb_context *ctx, sweep_run *s) {
+  const orb_map_level *l = s->job.level;
+  int32_t stepped = 0, next = 0;
+  orb_parallel_for(ctx, l->parts, 1, sweep_parts, s);
+  for (int32_t part = 0; part < l->parts; part++) {
+    stepped += s->stepped[part];
+  }
+  for (int32_t c = 0; c < l->colours; c++) {
+    stepped += sweep_border(ctx, s, c, &next);
   }
   return stepped;
 }
@@ -188,13 +205,9 @@ orb_status orb_map_level_sweeps(orb_context *ctx, orb_map_level *l, const orb_ma
   ORB_GO(status, reserve(ctx, &s), done);
   fill(&s);
   for (int i = 0; i < count && stepped > enough && status == ORB_OK; i++) {
-    int32_t next = 0;
-    stepped = 0;
-    for (int c = 0; c < l->colours && status == ORB_OK; c++) {
-      stepped += sweep_colour(ctx, &s, c, &next);
-      status = orb_context_check(ctx);
-    }
+    stepped = sweep_once(ctx, &s);
     *work -= stepped;
+    status = orb_context_check(ctx);
   }
   for (int32_t v = 0; v < l->count; v++) {
     take_vertex(&s.job, v);

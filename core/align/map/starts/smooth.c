@@ -27,13 +27,13 @@ typedef struct smoothing {
   double *trust;     /* 0 to 1 */
   double *smooth;    /* likewise: 0 for outliers, else how long a vertex has been without flips */
   double *point;     /* 4 per vertex, the last unused: where it is now */
-  int32_t *row;      /* the first edge of the i-th vertex of by_colour */
+  int32_t *row;      /* the first edge of the i-th vertex of by_group */
   smooth_edge *edge; /* to the neighbours, in that order */
 } smoothing;
 
 /* Vertices of one colour do not depend on each other, so their steps overlap in the processor. */
 static int32_t moving_count(const orb_map_level *l) {
-  return l->colour_start[l->colours];
+  return l->moving;
 }
 
 static double bounded(const smoothing *s, double cotangent) {
@@ -68,15 +68,15 @@ static void fill_edges(const smoothing *s) {
   int32_t count = 0;
   for (int32_t i = 0; i < moving_count(l); i++) {
     s->row[i] = count;
-    count += fill_row(s, l->by_colour[i], s->edge + count);
+    count += fill_row(s, l->by_group[i], s->edge + count);
   }
   s->row[moving_count(l)] = count;
 }
 
-/* Moves the i-th vertex of by_colour to the mean of its target and its neighbours. */
+/* Moves the i-th vertex of by_group to the mean of its target and its neighbours. */
 static void relax(const smoothing *s, int32_t i) {
   const orb_map_level *l = s->level;
-  const int32_t v = l->by_colour[i];
+  const int32_t v = l->by_group[i];
   const double reach = s->params->smooth.reach, own = 2 * s->trust[v] * l->area[v] / (reach * reach);
   const double *target = s->target + 3 * (size_t)v;
   double sum[4] = {own * target[0], own * target[1], own * target[2], 0}, all = own;
@@ -180,8 +180,8 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l, const int32_t *to_me
     weigh(&s);
   }
   for (int32_t i = 0; i < moving_count(l); i++) {
-    double *x = l->x + 3 * (size_t)l->by_colour[i];
-    memcpy(x, s.point + 4 * (size_t)l->by_colour[i], sizeof(double[3]));
+    double *x = l->x + 3 * (size_t)l->by_group[i];
+    memcpy(x, s.point + 4 * (size_t)l->by_group[i], sizeof(double[3]));
     orb_normalize(x);
   }
   status = orb_map_level_locate_all(c->ctx, l, &c->b, 0);
