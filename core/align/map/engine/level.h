@@ -47,9 +47,8 @@ typedef struct orb_map_level {
   double *target, *pull; /* spatial target, and the strength of its pull; 0: none */
   unsigned char *pinned;
   int32_t moving; /* vertices that have a colour: the others do not move */
-  /* Sweeps go through parts of the level side by side, and then through the border between them. group_start[colours ·
-   * p
-   * + c] is where the vertices of part p and colour c begin in by_group; part number `parts` is the border. */
+  /* Sweeps go through parts of the level side by side, and then through the border between them. The vertices of part p
+   * and colour c begin in by_group at group_start[p · colours + c]; part number `parts` is the border. */
   int32_t parts, colours, *group_start, *by_group;
 } orb_map_level;
 
