@@ -13,10 +13,9 @@
 #include "folder_lock.h"
 #include "log.h"
 #include "store/object_removal.h"
+#include "store/place.h"
 #include "store/snapshot.h"
 #include "store/transfer.h"
-
-static const char mark[] = "backup";
 
 /* Brings the objects of a catalogue from one folder to another. */
 typedef struct haul {
@@ -38,37 +37,55 @@ static int has(const char *folder, const char *name) {
   return access(path, F_OK) == 0;
 }
 
-/* Whether the folder is empty but for a lock; creates it. −1 with the reason printed: it cannot be used. */
-static int is_empty(const char *folder) {
-  int empty = 1;
+static int is_among(const char *name, const char *const *names) {
+  while (*names && strcmp(name, *names) != 0) {
+    names++;
+  }
+  return *names != NULL;
+}
+
+/* Whether all entries of the folder are among these names; creates the folder. −1 with the reason printed: it cannot be
+ * used. */
+static int has_only(const char *folder, const char *const *names) {
+  int only = 1;
   DIR *dir = mkdir(folder, 0700) == 0 || errno == EEXIST ? opendir(folder) : NULL;
   if (!dir) {
     complain(folder, strerror(errno));
     return -1;
   }
   for (struct dirent *entry; (entry = readdir(dir));) {
-    empty &= strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 || strcmp(entry->d_name, "lock") == 0;
+    only &= strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 || is_among(entry->d_name, names);
   }
   closedir(dir);
-  return empty;
+  return only;
 }
 
-static int put_mark(const char *folder) {
-  static const char text[] = "orbmorph backup, format 1\n";
+/* But for a lock. */
+static int is_empty(const char *folder) {
+  return has_only(folder, (const char *const[]){"lock", NULL});
+}
+
+/* Makes the file unless it exists, and writes the text at its beginning. Its name is on the disk when this returns. */
+static int put_file(const char *folder, const char *name, const char *text) {
   char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/%s", folder, mark);
-  int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-  int fine = fd >= 0 && write(fd, text, sizeof text - 1) == (ssize_t)sizeof text - 1 && fsync(fd) == 0;
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  size_t size = strlen(text);
+  int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0600), in = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  int fine = fd >= 0 && write(fd, text, size) == (ssize_t)size && fsync(fd) == 0 && in >= 0 && fsync(in) == 0;
+  fine = fine || complain(path, strerror(errno));
   if (fd >= 0) {
     close(fd);
   }
-  return fine || complain(path, strerror(errno));
+  if (in >= 0) {
+    close(in);
+  }
+  return fine;
 }
 
 /* Gives the new catalogue its name, after all that it names is on the disk. */
 static int commit(const char *folder) {
   char from[PATH_MAX], to[PATH_MAX];
-  snprintf(from, sizeof from, "%s/catalogue.new", folder);
+  snprintf(from, sizeof from, "%s/%s", folder, place_new_catalogue);
   snprintf(to, sizeof to, "%s/catalogue.sqlite", folder);
   int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   int fine = fd >= 0 && syncfs(fd) == 0 && rename(from, to) == 0 && fsync(fd) == 0;
@@ -100,7 +117,7 @@ static void bring_row(void *user, const resource *row) {
 /* Opens the rows of folder/catalogue.new and brings their objects. */
 static int bring_objects(haul *h, const char *folder) {
   char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/catalogue.new", folder);
+  snprintf(path, sizeof path, "%s/%s", folder, place_new_catalogue);
   if (snapshot_open(path, &h->rows) != STORE_OK || snapshot_each(h->rows, bring_row, h) != STORE_OK) {
     return complain(path, "cannot be read");
   }
@@ -136,7 +153,7 @@ static int hold_deletions(const char *data) {
 static int take(const char *folder, const char *data) {
   char path[PATH_MAX];
   haul h = {.links = 1};
-  snprintf(path, sizeof path, "%s/catalogue.new", folder);
+  snprintf(path, sizeof path, "%s/%s", folder, place_new_catalogue);
   int fine = snapshot_take(data, path) == STORE_OK && objects_open_read_only(data, &h.from) == STORE_OK &&
              objects_open(folder, &h.to) == STORE_OK && bring_objects(&h, folder) && commit(folder) &&
              objects_each(h.to, sweep_one, &h) == STORE_OK;
@@ -188,7 +205,7 @@ static int run_backup(const char *folder, const config *options) {
     return 1;
   }
   int empty = is_empty(folder);
-  if (empty == 0 && !has(folder, mark)) {
+  if (empty == 0 && !has(folder, place_backup_mark)) {
     complain(folder, "is neither empty nor a backup");
     return 1;
   }
@@ -196,7 +213,9 @@ static int run_backup(const char *folder, const config *options) {
     return 1;
   }
   int lock = folder_lock(folder);
-  int held = lock >= 0 && put_mark(folder) ? hold_deletions(options->data) : -1;
+  int held = lock >= 0 && put_file(folder, place_backup_mark, "orbmorph backup, format 1\n")
+                 ? hold_deletions(options->data)
+                 : -1;
   int status = held >= 0 ? take(folder, options->data) : 1;
   if (held >= 0) {
     close(held);
@@ -215,15 +234,43 @@ static int hold_backup(const char *folder) {
   return fd < 0 || flock(fd, LOCK_SH | LOCK_NB) == 0 || complain(folder, "is in use by a backup: repeat later");
 }
 
+/* Whether a restore may fill the folder: it is empty, or a restore into it was killed and nothing else has used it. */
+static int can_fill(const char *data) {
+  static const char wal[] = "catalogue.new-wal", shm[] = "catalogue.new-shm", journal[] = "catalogue.new-journal";
+  static const char *const made[] = {"lock", "backup.lock", "objects", "tmp", place_new_catalogue,
+                                     wal,    shm,           journal,   NULL};
+  return has(data, place_new_catalogue) ? has_only(data, made) : is_empty(data);
+}
+
+/* The new catalogue, still without rows, is the first thing in the folder, and no daemon starts on it from then on.
+ * Returns the lock of the folder, or −1 with the reason printed. */
+static int begin_filling(const char *data) {
+  static const char refusal[] = "is not empty: restore into a new folder";
+  int fills = can_fill(data);
+  if (fills == 0) {
+    complain(data, refusal);
+  }
+  int lock = fills == 1 && put_file(data, place_new_catalogue, "") ? folder_lock(data) : -1;
+  if (lock >= 0 && can_fill(data) != 1) { /* another restore has ended meanwhile */
+    complain(data, refusal);
+    close(lock);
+    lock = -1;
+  }
+  return lock;
+}
+
+/* What a restore that was killed has brought stays, unless this backup does not name it. */
 static int put_back(const char *folder, const char *data) {
   char path[PATH_MAX];
   haul h = {0};
-  snprintf(path, sizeof path, "%s/catalogue.new", data);
+  snprintf(path, sizeof path, "%s/%s", data, place_new_catalogue);
   int fine = snapshot_take(folder, path) == STORE_OK && snapshot_requeue(path) == STORE_OK &&
              objects_open_read_only(folder, &h.from) == STORE_OK && objects_open(data, &h.to) == STORE_OK &&
-             bring_objects(&h, data) && commit(data);
+             bring_objects(&h, data) && objects_each(h.to, sweep_one, &h) == STORE_OK && commit(data);
   if (fine) {
-    printf("%ld objects restored, %ld damaged or missing\n", h.made, h.wrong);
+    printf("%ld objects restored, %ld damaged or missing\n", h.objects - h.wrong, h.wrong);
+  } else {
+    complain(data, "is not complete: run the restore again");
   }
   if (fine && h.wrong) {
     puts("all else is restored: start the daemon, DELETE what is named above, and upload or request it again");
@@ -240,15 +287,11 @@ static int run_restore(const char *folder, const config *options) {
   if (config_catalogue(options)) {
     return refuse_url();
   }
-  if (!has(folder, mark) || !has(folder, "catalogue.sqlite")) {
+  if (!has(folder, place_backup_mark) || !has(folder, "catalogue.sqlite")) {
     complain(folder, "is not a complete backup");
     return 1;
   }
-  int empty = is_empty(options->data), reading = hold_backup(folder);
-  if (empty == 0) {
-    complain(options->data, "is not empty: restore into a new folder; delete it if a restore was killed");
-  }
-  int lock = empty == 1 && reading ? folder_lock(options->data) : -1;
+  int lock = hold_backup(folder) ? begin_filling(options->data) : -1;
   int status = lock >= 0 ? put_back(folder, options->data) : 1;
   if (lock >= 0) {
     close(lock);

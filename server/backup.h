@@ -6,6 +6,9 @@
  * catalogue names. It copies objects first, then replaces the catalogue, then deletes objects that the new catalogue
  * does not name. So the folder is always a complete backup, the previous or the new one, and the process may be killed
  * at any time.
+ *
+ * A restore makes catalogue.new first, before the lock, and renames it to catalogue.sqlite last. Until then daemons and
+ * all commands refuse the folder (store/place.h), and another restore goes on with it.
  */
 #ifndef ORB_BACKUP_H
 #define ORB_BACKUP_H

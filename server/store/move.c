@@ -153,6 +153,9 @@ static store_result match_folder(const move *m) {
   if ((*rows && strcmp(rows, m->mark) != 0) || (*files && strcmp(files, m->mark) != 0)) {
     return refuse("the data folder of the target belongs to another deployment");
   }
+  if (place_is_unfinished(p->data)) {
+    return refuse("a restore into the data folder of the target has not ended");
+  }
   if ((*rows && !p->catalogue) || (*files && !p->bucket.url)) {
     return refuse("the data folder of the target has its catalogue or its objects elsewhere than the options say");
   }

@@ -12,6 +12,7 @@
 
 enum { MARK = PLACE_MARK };
 const char place_catalogue[] = "catalogue.postgresql", place_objects[] = "objects.s3";
+const char place_new_catalogue[] = "catalogue.new", place_backup_mark[] = "backup";
 
 static void path_in(const char *data, const char *name, char out[PATH_MAX]) {
   snprintf(out, PATH_MAX, "%s/%s", data, name);
@@ -120,8 +121,34 @@ static store_result open_url(const char *data, const char *url, int shared, cons
   return result;
 }
 
+static int has(const char *data, const char *name) {
+  char path[PATH_MAX];
+  path_in(data, name, path);
+  return access(path, F_OK) == 0;
+}
+
+int place_is_unfinished(const char *data) {
+  return has(data, place_new_catalogue) && !place_has_catalogue(data);
+}
+
+/* A daemon would make an empty catalogue there, and then nothing would tell what is missing. */
+static store_result refuse_unfinished(const char *data) {
+  if (!place_is_unfinished(data)) {
+    return STORE_OK;
+  }
+  log_error(has(data, place_backup_mark)
+                ? "%s is the folder of a backup that has not ended: name the data folder with --data"
+                : "a restore into %s has not ended: run orbmorphd restore again until it ends, or name another folder "
+                  "with --data",
+            data);
+  return STORE_UNFIT;
+}
+
 store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out) {
   char path[PATH_MAX], mark[MARK];
+  if (refuse_unfinished(data) != STORE_OK) {
+    return STORE_UNFIT;
+  }
   path_in(data, place_catalogue, path);
   if (read_mark(path, mark) != STORE_OK) {
     log_error("%s cannot be read, or is damaged", path);
@@ -155,9 +182,7 @@ int place_has_files(const char *data) {
 }
 
 int place_has_catalogue(const char *data) {
-  char path[PATH_MAX];
-  path_in(data, "catalogue.sqlite", path);
-  return access(path, F_OK) == 0;
+  return has(data, "catalogue.sqlite");
 }
 
 /* Checks what can be checked before the catalogue is opened, which may create it. here: the mark of the data folder. */
@@ -266,6 +291,9 @@ store_place store_place_of(const config *options) {
 
 store_result stores_open(const store_place *place, objects **store, catalogue **cat) {
   char path[PATH_MAX], mark[MARK];
+  if (refuse_unfinished(place->data) != STORE_OK) { /* before objects_open(), which writes */
+    return STORE_UNFIT;
+  }
   path_in(place->data, place_objects, path);
   if (read_mark(path, mark) != STORE_OK) {
     log_error("%s cannot be read, or is damaged", path);

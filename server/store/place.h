@@ -12,8 +12,9 @@
 #include "store/objects.h"
 
 /* url: of a database in PostgreSQL; NULL: SQLite. STORE_UNFIT: the two do not belong together, the database cannot be
- * written, its schema is newer than this program, or it refuses the credentials; nothing was written, and the log says
- * what is wrong. shared: several nodes use the database, as they do where objects are in a bucket. */
+ * written, its schema is newer than this program, or it refuses the credentials, or a restore into the folder has not
+ * ended; nothing was written, and the log says what is wrong. shared: several nodes use the database, as they do where
+ * objects are in a bucket. */
 store_result catalogue_open_among(const char *data, const char *url, int shared, catalogue **out);
 
 /* The mark that ties them together: a hash of the catalogue's secret. It is in these two files of the data folder and
@@ -25,6 +26,11 @@ void place_hash(const unsigned char secret[CATALOGUE_SECRET], char out[PLACE_MAR
 /* name: of the file. out: "" where there is none. */
 store_result place_read_mark(const char *data, const char *name, char out[PLACE_MARK]);
 store_result place_write_mark(const char *data, const char *name, const char mark[PLACE_MARK]);
+/* The names of a catalogue that a backup or a restore makes, until all that it names is there, and of the file that
+ * marks the folder of a backup. */
+extern const char place_new_catalogue[], place_backup_mark[];
+/* Whether a restore, or the first backup, into the folder has not ended: it has a new catalogue only. */
+int place_is_unfinished(const char *data);
 /* Whether the data folder has objects in files, and whether it has a catalogue in SQLite. */
 int place_has_files(const char *data);
 int place_has_catalogue(const char *data);

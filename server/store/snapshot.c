@@ -1,7 +1,9 @@
 #include "store/snapshot.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "store/rows.h"
@@ -60,17 +62,31 @@ static store_result sync_file(const char *path) {
   return fine ? STORE_OK : STORE_ERROR;
 }
 
+/* Empties the file, so that its name stays, and deletes what SQLite had beside it when the process was killed. */
+static void discard(const char *path) {
+  static const char *const tails[] = {"-journal", "-wal", "-shm"};
+  for (size_t i = 0; i < sizeof tails / sizeof tails[0]; i++) {
+    char beside[PATH_MAX];
+    if (snprintf(beside, sizeof beside, "%s%s", path, tails[i]) < (int)sizeof beside) {
+      unlink(beside);
+    }
+  }
+  if (truncate(path, 0) != 0 && errno != ENOENT) {
+    log_error("%s cannot be emptied: %s", path, strerror(errno));
+  }
+}
+
 store_result snapshot_take(const char *data, const char *path) {
   char from[PATH_MAX];
   snprintf(from, sizeof from, "%s/catalogue.sqlite", data);
-  unlink(path);
+  discard(path);
   int code = vacuum_into(from, path);
   code = code == SQL_OK ? make_current(path, from) : code;
   if (code == SQL_OK && sync_file(path) == STORE_OK) {
     return STORE_OK;
   }
   log_error("the catalogue %s cannot be copied to %s: %s", from, path, sql_reason(code));
-  unlink(path);
+  discard(path);
   return code == SQL_FULL ? STORE_FULL : STORE_ERROR;
 }
 

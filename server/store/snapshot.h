@@ -7,8 +7,9 @@
 
 typedef struct snapshot snapshot;
 
-/* Copies the catalogue of `data` to the file `path`, which is replaced, checks the copy (PRAGMA quick_check), and
- * brings its schema up to date. The file is on the disk when this returns; the caller syncs its folder. */
+/* Copies the catalogue of `data` to the file `path`, whose bytes are replaced, and whose name stays throughout; checks
+ * the copy (PRAGMA quick_check), and brings its schema up to date. The file is on the disk when this returns; the
+ * caller syncs its folder. On failure it is empty. */
 store_result snapshot_take(const char *data, const char *path);
 /* Queues the jobs that were running, as if they had not begun. */
 store_result snapshot_requeue(const char *path);

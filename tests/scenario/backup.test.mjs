@@ -1,18 +1,15 @@
 // Backs up a data folder that a daemon serves, and checks what is restored.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { createHash } from 'node:crypto';
-import { existsSync, readdirSync, readFileSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, readFileSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
+import { mesh, object, sha256, trap, watching } from './support/backup.mjs';
 import { folder, runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, Daemon, daemon, endless, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const run = (...args) => runProgram(binaries.daemon, args);
-const object = (data, kind, id) => path.join(data, 'objects', kind, id.slice(0, 2), id);
-const mesh = (k) => shapes.obj(shapes.ball(2, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(5 * y + k)), 1.5 * y, z]));
-const sha256 = (bytes) => createHash('sha256').update(bytes).digest('hex');
 
 /** Starts a daemon on a folder that another program made. */
 async function serve(t, data, ...args) {
@@ -179,4 +176,168 @@ test('a backup and a restore refuse what they would overwrite, and report damage
   assert.equal((await other.get(`${a.url}/file`)).bytes.toString(), mesh(0));
   assert.equal((await other.upload(mesh(1))).status, 200, 'sending it again completes the service');
   assert.equal((await other.get(`${b.url}/file`)).bytes.toString(), mesh(1));
+});
+
+/** No program takes a folder for data while a restore into it has not ended. */
+async function refuses(t, data, ...commands) {
+  const why =
+    /a restore into \S+ has not ended: run orbmorphd restore again until it ends, or name another folder with/;
+  const d = new Daemon(data, [], {});
+  t.after(() => d.child.kill('SIGKILL'));
+  await assert.rejects(d.start(), /exit 78/);
+  assert.match(d.log, why);
+  for (const words of commands) {
+    const { code, err } = await run(...words, '--data', data);
+    assert.equal(code, 78, words.join(' '));
+    assert.match(err, why);
+  }
+  assert.equal(existsSync(path.join(data, 'catalogue.sqlite')), false);
+}
+
+test('no daemon starts on what a killed restore has left, and another restore completes it', async (t) => {
+  const watch = watching(t);
+  const d = await daemon(t);
+  const place = await folder(t);
+  const [backup, fresh, aside] = ['backup', 'new', 'aside'].map((name) => path.join(place, name));
+  const ids = [];
+  for (let k = 0; k < 24; k++) ids.push((await d.upload(mesh(k))).json.id);
+  await d.made('/v1/embeddings', { mesh: ids[0] });
+  assert.equal((await run('backup', backup, '--data', d.data)).code, 0);
+  const count = () => readdirSync(path.join(fresh, 'objects/mesh'), { recursive: true }).filter((f) => f.length > 64);
+
+  // Killed after its first step, and while it writes the catalogue.
+  mkdirSync(fresh);
+  const begun = path.join(fresh, 'catalogue.new');
+  writeFileSync(begun, '');
+  await refuses(t, fresh, ['--check-data'], ['--gc'], ['token', 'add', 'x', '--scope', 'read']);
+  const whole = readFileSync(path.join(backup, 'catalogue.sqlite'));
+  writeFileSync(begun, whole.subarray(0, whole.length / 2));
+  for (const tail of ['wal', 'journal']) writeFileSync(`${begun}-${tail}`, whole.subarray(whole.length / 2));
+  await refuses(t, fresh);
+
+  // Killed before the first object, in the middle, before the last one. Each goes on where the one before was killed.
+  for (const k of [0, 11, 23]) {
+    const put_back = trap(object(backup, 'mesh', ids[k]), aside);
+    const restore = watch.run('restore', backup, '--data', fresh);
+    const last = k ? object(fresh, 'mesh', ids[k - 1]) : path.join(fresh, 'objects/alignment');
+    await restore.signal('SIGKILL', () => existsSync(last));
+    assert.equal(await restore.ended, 'SIGKILL', restore.text);
+    put_back();
+    assert.equal(count().length, k);
+    await refuses(t, fresh);
+  }
+  const other = path.join(fresh, 'notes.txt');
+  writeFileSync(other, 'of somebody');
+  assert.match((await run('restore', backup, '--data', fresh)).err, /is not empty/);
+  rmSync(other);
+
+  // The backup is a later one now, without a mesh that has been restored.
+  assert.equal((await d.delete(`/v1/meshes/${ids[1]}`)).status, 204);
+  assert.equal((await run('backup', backup, '--data', d.data)).code, 0);
+  const all = await files(d);
+  const complete = async (data) => {
+    const check = await run('--check-data', '--data', data);
+    assert.match(check.out, /: 0 wrong, 0 objects without a row/);
+    const served = await serve(t, data);
+    assert.deepEqual(await files(served), all);
+    await served.stop();
+  };
+  const restored = await run('restore', backup, '--data', fresh);
+  assert.equal(restored.code, 0, restored.err);
+  assert.match(restored.out, /^24 objects restored, 0 damaged or missing$/m);
+  await complete(fresh);
+
+  // Killed as soon as a catalogue is there: the new one, or that of a complete restore.
+  for (const name of ['catalogue.new', 'catalogue.sqlite']) {
+    const data = path.join(place, `at-${name}`);
+    const restore = watch.run('restore', backup, '--data', data);
+    await restore.signal('SIGKILL', () => existsSync(path.join(data, name)));
+    await restore.ended;
+    if (!existsSync(path.join(data, 'catalogue.sqlite'))) {
+      await refuses(t, data);
+      assert.equal((await run('restore', backup, '--data', data)).code, 0);
+    }
+    await complete(data);
+  }
+});
+
+test('each backup under load, also over kill -9, is restored with all that was acknowledged', async (t) => {
+  const watch = watching(t);
+  const args = ['--workers', '1', '--derived-bytes', '1M', '--scrub-rate', '0', '--drain-seconds', '0'];
+  const d = await daemon(t, { args });
+  const place = await folder(t);
+  const [backup, aside] = ['backup', 'aside'].map((name) => path.join(place, name));
+  const words = ['backup', backup, '--data', d.data];
+  const evicted = () => d.log.match(/evicted a derived/g)?.length ?? 0;
+  const load = watch.load(d);
+  let backups = 0;
+  let last; // when the last successful backup was made
+  const check = async () => {
+    load.rests = true;
+    const fresh = path.join(place, `new-${backups++}`);
+    const restored = await run('restore', backup, '--data', fresh);
+    assert.equal(restored.code, 0, restored.out + restored.err);
+    const { out } = await run('--check-data', '--data', fresh);
+    assert.match(out, /: 0 wrong, 0 objects without a row/);
+    const served = await serve(t, fresh, '--drain-seconds', '0');
+    assert.ok((await load.check(served, last)) > 0);
+    await served.stop();
+    load.rests = false;
+  };
+  const runs = async () => {
+    const { deleted, made } = load;
+    await load.until(() => load.deleted > deleted + 1 && load.made > made + 1, 'the load runs');
+  };
+  const succeeds = async (one) => {
+    assert.equal(await one.ended, 0, one.text);
+    last = { since: one.since, done: performance.now() };
+    await check();
+  };
+  const begun = path.join(backup, 'catalogue.new');
+
+  await runs();
+  await succeeds(watch.run(...words));
+
+  // The daemon dies while a backup copies the catalogue, and while it brings objects. The next life of the daemon deletes
+  // and evicts before the backup goes on.
+  for (const moment of ['catalogue', 'objects']) {
+    for (let halted = false, tries = 0; !halted; tries++) {
+      assert.ok(tries < 10, 'a backup takes long enough to be stopped');
+      await runs();
+      const victim = await load.upload(mesh(10_000 + backups));
+      const brought = object(backup, 'mesh', victim.id);
+      for (let k = 0; k < 5; k++) await load.upload(mesh(20_000 + 100 * backups + k));
+      const one = watch.run(...words);
+      halted = await one.stop(() => existsSync(begun) && (moment === 'catalogue' || existsSync(brought)));
+      if (halted) {
+        d.killed = true;
+        await d.stop('SIGKILL');
+        await d.start();
+        d.killed = false;
+        const before = { deleted: load.deleted, made: load.made, evicted: evicted() };
+        await load.delete(victim.url);
+        await load.until(
+          () => load.deleted > before.deleted + 1 && load.made > before.made && evicted() > before.evicted,
+          'the new daemon deletes, ends a job and evicts',
+        );
+        assert.ok(existsSync(object(d.data, 'mesh', victim.id)), 'no object is deleted while a backup runs');
+        one.child.kill('SIGCONT');
+      }
+      await succeeds(one);
+    }
+  }
+
+  // The backup dies: the folder still is the one before.
+  const [brought, awaited] = [await load.upload(mesh(30_000)), await load.upload(mesh(30_001))];
+  const put_back = trap(object(d.data, 'mesh', awaited.id), aside);
+  const killed = watch.run(...words);
+  await killed.signal('SIGKILL', () => existsSync(object(backup, 'mesh', brought.id)));
+  assert.equal(await killed.ended, 'SIGKILL', killed.text);
+  put_back();
+  await check();
+  await runs();
+  await succeeds(watch.run(...words));
+  await load.end();
+  await d.stop();
+  assert.match((await run('--check-data', '--data', d.data)).out, /: 0 wrong/);
 });
