@@ -242,17 +242,21 @@ static int can_fill(const char *data) {
   return has(data, place_new_catalogue) ? has_only(data, made) : is_empty(data);
 }
 
-/* The new catalogue, still without rows, is the first thing in the folder, and no daemon starts on it from then on.
- * Returns the lock of the folder, or −1 with the reason printed. */
+/* The new catalogue, still without rows, is the first thing in the folder but for the lock, and no daemon starts on it
+ * from then on. The lock comes before: a folder in use by a daemon with another catalogue stays as it is. Returns the
+ * lock, or −1 with the reason printed. */
 static int begin_filling(const char *data) {
   static const char refusal[] = "is not empty: restore into a new folder";
   int fills = can_fill(data);
   if (fills == 0) {
     complain(data, refusal);
   }
-  int lock = fills == 1 && put_file(data, place_new_catalogue, "") ? folder_lock(data) : -1;
-  if (lock >= 0 && can_fill(data) != 1) { /* another restore has ended meanwhile */
+  int lock = fills == 1 ? folder_lock(data) : -1;
+  fills = lock >= 0 ? can_fill(data) : -1;
+  if (fills == 0) { /* another restore has ended meanwhile */
     complain(data, refusal);
+  }
+  if (lock >= 0 && (fills != 1 || !put_file(data, place_new_catalogue, ""))) {
     close(lock);
     lock = -1;
   }

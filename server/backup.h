@@ -7,7 +7,7 @@
  * does not name. So the folder is always a complete backup, the previous or the new one, and the process may be killed
  * at any time.
  *
- * A restore makes catalogue.new first, before the lock, and renames it to catalogue.sqlite last. Until then daemons and
+ * A restore locks the folder, makes catalogue.new, and renames it to catalogue.sqlite last. Until then daemons and
  * all commands refuse the folder (store/place.h), and another restore goes on with it.
  */
 #ifndef ORB_BACKUP_H

@@ -128,7 +128,7 @@ static int has(const char *data, const char *name) {
 }
 
 int place_is_unfinished(const char *data) {
-  return has(data, place_new_catalogue) && !place_has_catalogue(data);
+  return has(data, place_new_catalogue) && !place_has_catalogue(data) && !has(data, place_catalogue);
 }
 
 /* A daemon would make an empty catalogue there, and then nothing would tell what is missing. */

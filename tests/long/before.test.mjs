@@ -106,7 +106,7 @@ test('--check-data reports such files, and --gc deletes none of them', async (t)
   assert.equal((await run('--gc')).code, 0);
   const kept = readdirSync(d.data, { recursive: true, withFileTypes: true })
     .filter((entry) => entry.isFile())
-    .map((entry) => readFileSync(path.join(entry.path, entry.name), 'latin1'));
+    .map((entry) => readFileSync(path.join(entry.parentPath ?? entry.path, entry.name), 'latin1'));
   const deleted = lost.filter((text) => !kept.includes(text)).length;
   assert.equal(deleted, 0, `of ${lost.length} files; --check-data said: ${out}`);
   assert.match(out, /lost rows/);

@@ -106,7 +106,10 @@ for (let n = 0; n < deaths; ) {
       .map((pid) => ({ pid, mesh: meshOf(pid) }))
       .filter(({ mesh }) => mesh || n % 2 === 0); // most check files: every second death waits for one that runs a job
   let there = find();
-  for (; n % 2 && !there.length; there = find()) await Promise.race([sleep(5), failed]);
+  for (const since = Date.now(); n % 2 && !there.length; there = find()) {
+    assert.ok(Date.now() - since < 600_000, 'no process has had a mesh open for ten minutes');
+    await Promise.race([sleep(5), failed]);
+  }
   if (!there.length) continue;
   const { pid, mesh } = there[Math.floor(random() * there.length)];
   const death = { way: ways[Math.floor(n / 2) % ways.length], mesh, at: Date.now() };
@@ -201,6 +204,10 @@ for (const { mesh, type, at } of refused) {
 }
 for (const [mesh, { behind }] of ofFile) assert.ok(behind <= 1, mesh);
 // No count of crashes that outlives the jobs is of more deaths than those of its job, or file.
+assert.ok(
+  records.split('\n').every((line) => !line || / crashes=\d+ .*mesh=\w/.test(line)),
+  records,
+);
 for (const [, key, count, mesh] of records.matchAll(/^(\w+) crashes=(\d+) .*?mesh=(\w+)/gm)) {
   const own =
     key === mesh ? ofFile.get(mesh)?.alone : ofJob.get(jobs.find((job) => job.mesh === mesh)?.id)?.deaths.length;

@@ -13,6 +13,7 @@
  *   symmetry.h, mirrored.h
  *             the mirror symmetries of the copies, and trials that keep them
  *   raised.h  the best trials, on finer copies
+ *   hinted.h  the trial that eight landmarks or more make, without a search
  *   match.h   the best of them, its pairs and its targets
  *   inset/    whether one shape is a part of the other one (inset/inset.h)
  *   found.h   the landmarks that an alignment found, and their confidence

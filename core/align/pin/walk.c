@@ -368,11 +368,11 @@ static orb_status walk_one(orb_context *ctx, void *arg, int32_t s) {
 static orb_status finish_one(orb_context *ctx, void *arg, int32_t s) {
   const company *all = arg;
   walker *w = &all->walkers[s];
-  w->ctx = ctx;
-  if (all->last && s == all->shape_count - 1) {
+  if (all->last && s == all->shape_count - 1) { /* its level is handed over instead, once all others are good */
     all->good[s] = 1;
-    return hand_over(w, all->last);
+    return ORB_OK;
   }
+  w->ctx = ctx;
   all->points[s] = ORB_NEW(ctx, double, 3 * (size_t)all->sheets[s].vertex_capacity);
   if (!all->points[s]) {
     return ORB_E_NO_MEMORY;
@@ -414,6 +414,11 @@ static orb_status walk_together(orb_context *ctx, company *all, int *stuck) {
   *stuck = 0;
   for (int32_t s = 0; s < all->shape_count; s++) {
     *stuck |= !all->good[s];
+  }
+  if (all->last && !*stuck) {
+    *stuck = 1; /* should this fail */
+    ORB_TRY(hand_over(&all->walkers[all->shape_count - 1], all->last));
+    *stuck = 0;
   }
   for (int32_t s = 0; s < all->shape_count - (all->last != NULL) && !*stuck; s++) {
     double *old = all->sheets[s].shape.points;

@@ -23,7 +23,7 @@ void orb_walk_level_free(orb_context *ctx, orb_walk_level *level);
 /* Embeds the shapes again, together: on a coarse level the landmarks walk to their spherical means and are pinned
  * there, and the level is refined to the full meshes. *stuck 0: all arrived and every embedding is certified; 1: the
  * sheets are unchanged. last: NULL, or receives the level of the last shape, which then is not refined: its sheet is
- * unchanged too. */
+ * unchanged too. It is empty if the landmarks are stuck or the call fails. Shapes walk side by side. */
 ORB_MUST_CHECK orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
                                        const int32_t *landmarks, int32_t count, const orb_walk_options *options,
                                        orb_walk_level *last, int *stuck);

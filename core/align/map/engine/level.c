@@ -16,7 +16,7 @@ enum { LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 }; /* vertices between checks for
 enum {
   PART_LEAST = 500, /* vertices of a part; with half as many, a colour of a part often fills no vector, and sweeps take
                        a tenth more processor time */
-  PARTS_MOST = 64   /* as many as threads; a power of two, since most machines have an even number of threads */
+  PARTS_MOST = 64   /* as many as threads. Parts depend on the level alone, so that results do not depend on threads */
 };
 
 void orb_map_level_free(orb_context *ctx, orb_map_level *l) {
@@ -164,8 +164,8 @@ static void choose_colours(orb_map_level *l, signed char *colour) {
   }
 }
 
-/* Vertices are numbered along a curve that fills the surface, so ranges of numbers are parts of it. The border is what
- * keeps the rest of the parts apart, and all vertices with many spokes, which sweeps step one by one. */
+/* The corner table numbers vertices along a curve that fills the surface, so ranges of numbers are parts of it. The
+ * border is what keeps the rest of the parts apart, and all vertices with many spokes, which sweeps step one by one. */
 static void choose_parts(orb_map_level *l, int32_t *part) {
   for (l->parts = 1; l->parts < PARTS_MOST && l->count / (2 * l->parts) >= PART_LEAST;) {
     l->parts *= 2;

@@ -1,10 +1,11 @@
 /* Sweeps of a level by the vector loops: what steps read is laid out once for all sweeps of a round.
  *
  * A sweep goes through the parts of the level, which run side by side, and then through the border between them. So
- * threads wait for each other twice a sweep, not after each colour, which took longer than the steps of a colour of a
- * small level. Each part, and the border, goes from colour to colour. No two vertices of a colour are neighbours, so
- * their steps are independent: the stirred ones, near which something has moved, are listed first and stepped then.
- * Parts and lists are the same for any number of threads, and so are the results. */
+ * threads of a small level wait for each other once a sweep, and not after each colour, which took longer than its
+ * steps; colours of a border are shared only where they are large. Each part, and the border, goes from colour to
+ * colour. No two vertices of a colour are neighbours, so their steps are independent: the stirred ones, near which
+ * something has moved, are listed first and stepped then. Parts and lists are the same for any number of threads, and
+ * so are the results. */
 #include "align/map/engine/sweep.h"
 
 #include <string.h>
@@ -183,18 +184,20 @@ static int32_t sweep_border(orb_context *ctx, sweep_run *s, int32_t c, int32_t *
   return stepped;
 }
 
-/* One sweep; returns the number of steps. */
-static int32_t sweep_once(orb_context *ctx, sweep_run *s) {
+/* One sweep. *stepped: the number of steps. */
+static orb_status sweep_once(orb_context *ctx, sweep_run *s, int32_t *stepped) {
   const orb_map_level *l = s->job.level;
-  int32_t stepped = 0, next = 0;
+  int32_t next = 0;
+  *stepped = 0;
   orb_parallel_for(ctx, l->parts, 1, sweep_parts, s);
   for (int32_t part = 0; part < l->parts; part++) {
-    stepped += s->stepped[part];
+    *stepped += s->stepped[part];
   }
   for (int32_t c = 0; c < l->colours; c++) {
-    stepped += sweep_border(ctx, s, c, &next);
+    ORB_TRY(orb_context_check(ctx));
+    *stepped += sweep_border(ctx, s, c, &next);
   }
-  return stepped;
+  return orb_context_check(ctx);
 }
 
 orb_status orb_map_level_sweeps(orb_context *ctx, orb_map_level *l, const orb_map_packed *packed,
@@ -205,9 +208,8 @@ orb_status orb_map_level_sweeps(orb_context *ctx, orb_map_level *l, const orb_ma
   ORB_GO(status, reserve(ctx, &s), done);
   fill(&s);
   for (int i = 0; i < count && stepped > enough && status == ORB_OK; i++) {
-    stepped = sweep_once(ctx, &s);
+    status = sweep_once(ctx, &s, &stepped);
     *work -= stepped;
-    status = orb_context_check(ctx);
   }
   for (int32_t v = 0; v < l->count; v++) {
     take_vertex(&s.job, v);

@@ -33,7 +33,7 @@ typedef struct orb_map_step_job {
 /* One version of the loop. */
 typedef struct orb_map_loops {
   const char *name;
-  int lanes; /* vertices at once; [begin, end) should begin at multiples of it */
+  int lanes; /* vertices at once */
   void (*steps)(const orb_map_step_job *job, int64_t begin, int64_t end);
 } orb_map_loops;
 
