@@ -216,9 +216,44 @@ static void landmarks_make_a_trial(void **state) {
   }
 }
 
+/* True landmarks make the match without a search, and each limb goes to its own. If the partners are one limb further,
+ * the trial bends the shapes much: it is dropped with all that was made for it, and a search may begin. */
+static void landmarks_are_tried(void **state) {
+  (void)state;
+  for (int wrong = 0; wrong < 2; wrong++) {
+    scene s;
+    double bend;
+    scene_open(&s, alike);
+    give_landmarks(&s, 0);
+    orb_hint_places *hint = &s.coarse.hint;
+    for (int32_t i = 0; wrong && i + 1 < hint->count; i++) {
+      int32_t *vertex = hint->vertex[1] + i;
+      const int32_t first = vertex[0];
+      vertex[0] = vertex[1];
+      vertex[1] = first;
+      for (int k = 0; k < 3; k++) {
+        double *at = hint->at[1] + 3 * (size_t)i + k;
+        const double x = at[0];
+        at[0] = at[3];
+        at[3] = x;
+      }
+    }
+    assert_int_equal(orb_trials_try_hinted(&s.coarse, &bend), ORB_OK);
+    assert_int_equal(s.coarse.count, !wrong);
+    assert_int_equal(bend <= ORB_FIND_HINTED_BEND, !wrong);
+    if (wrong) {
+      assert_null(s.coarse.survey[0].tree);
+      assert_null(s.coarse.survey[1].tree);
+    } else {
+      assert_limbs(&s.coarse);
+    }
+    scene_close(&s);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_end_in_tips), cmocka_unit_test(tips_meet_their_partners),
-                                     cmocka_unit_test(best_trial_keeps_limbs),
-                                     cmocka_unit_test(landmarks_make_a_trial)};
+                                     cmocka_unit_test(best_trial_keeps_limbs), cmocka_unit_test(landmarks_make_a_trial),
+                                     cmocka_unit_test(landmarks_are_tried)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }
