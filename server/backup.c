@@ -31,12 +31,6 @@ static int complain(const char *folder, const char *why) {
   return 0;
 }
 
-static int has(const char *folder, const char *name) {
-  char path[PATH_MAX];
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  return access(path, F_OK) == 0;
-}
-
 static int is_among(const char *name, const char *const *names) {
   while (*names && strcmp(name, *names) != 0) {
     names++;
@@ -189,7 +183,7 @@ static int refuse_bucket(void) {
 }
 
 static int is_in_bucket(const config *options) {
-  return strcmp(options->objects, "files") != 0 || has(options->data, "objects.s3");
+  return strcmp(options->objects, "files") != 0 || place_has(options->data, "objects.s3");
 }
 
 static int run_backup(const char *folder, const config *options) {
@@ -200,12 +194,12 @@ static int run_backup(const char *folder, const config *options) {
   if (config_catalogue(options)) {
     return refuse_url();
   }
-  if (!has(options->data, "catalogue.sqlite")) {
+  if (!place_has_catalogue(options->data)) {
     complain(options->data, "is not a data folder: name that of the service with --data");
     return 1;
   }
   int empty = is_empty(folder);
-  if (empty == 0 && !has(folder, place_backup_mark)) {
+  if (empty == 0 && !place_has(folder, place_backup_mark)) {
     complain(folder, "is neither empty nor a backup");
     return 1;
   }
@@ -234,29 +228,23 @@ static int hold_backup(const char *folder) {
   return fd < 0 || flock(fd, LOCK_SH | LOCK_NB) == 0 || complain(folder, "is in use by a backup: repeat later");
 }
 
-/* Whether a restore may fill the folder: it is empty, or a restore into it was killed and nothing else has used it. */
+/* Whether a restore may fill the folder: it is empty, or a restore into it was killed and nothing else has used it. 0
+ * with the reason printed. */
 static int can_fill(const char *data) {
   static const char wal[] = "catalogue.new-wal", shm[] = "catalogue.new-shm", journal[] = "catalogue.new-journal";
   static const char *const made[] = {"lock", "backup.lock", "objects", "tmp", place_new_catalogue,
                                      wal,    shm,           journal,   NULL};
-  return has(data, place_new_catalogue) ? has_only(data, made) : is_empty(data);
+  const int fills = place_has(data, place_new_catalogue) ? has_only(data, made) : is_empty(data);
+  return fills ? fills > 0 : complain(data, "is not empty: restore into a new folder");
 }
 
 /* The new catalogue, still without rows, is the first thing in the folder but for the lock, and no daemon starts on it
  * from then on. The lock comes before: a folder in use by a daemon with another catalogue stays as it is. Returns the
  * lock, or −1 with the reason printed. */
 static int begin_filling(const char *data) {
-  static const char refusal[] = "is not empty: restore into a new folder";
-  int fills = can_fill(data);
-  if (fills == 0) {
-    complain(data, refusal);
-  }
-  int lock = fills == 1 ? folder_lock(data) : -1;
-  fills = lock >= 0 ? can_fill(data) : -1;
-  if (fills == 0) { /* another restore has ended meanwhile */
-    complain(data, refusal);
-  }
-  if (lock >= 0 && (fills != 1 || !put_file(data, place_new_catalogue, ""))) {
+  int lock = can_fill(data) ? folder_lock(data) : -1;
+  if (lock >= 0 &&
+      !(can_fill(data) /* no other restore has ended meanwhile */ && put_file(data, place_new_catalogue, ""))) {
     close(lock);
     lock = -1;
   }
@@ -291,7 +279,7 @@ static int run_restore(const char *folder, const config *options) {
   if (config_catalogue(options)) {
     return refuse_url();
   }
-  if (!has(folder, place_backup_mark) || !has(folder, "catalogue.sqlite")) {
+  if (!place_has(folder, place_backup_mark) || !place_has_catalogue(folder)) {
     complain(folder, "is not a complete backup");
     return 1;
   }

@@ -123,7 +123,7 @@ struct Adder {
     const size_t from = 4 * static_cast<size_t>(block.first), count = 4 * block.count;
     int64_t joints = NONE;
     if (more.skin.joint_count <= 256) {
-      std::vector<unsigned char, Charged<unsigned char>> bytes{Charged<unsigned char>(ctx)};
+      Counted<unsigned char> bytes{Charged<unsigned char>(ctx)};
       for (size_t k = 0; k < count; k++) {
         bytes.push_back(static_cast<unsigned char>(more.skin.joints[from + k]));
       }

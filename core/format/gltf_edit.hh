@@ -6,7 +6,7 @@
 
 namespace gltf {
 
-using Floats = std::vector<float, Charged<float>>;
+using Floats = Counted<float>;
 
 /* A value that was just made; NULL: the parser's memory is spent. */
 inline cJSON *made(cJSON *item) {

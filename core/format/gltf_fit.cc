@@ -20,7 +20,7 @@ struct Part {
   double size[2] = {};                  /* squared distances from the middle, before and after */
 };
 
-using Parts = std::vector<Part, Charged<Part>>;
+using Parts = Counted<Part>;
 
 struct Fitter {
   const Skeleton &skeleton;

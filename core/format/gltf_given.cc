@@ -104,18 +104,6 @@ std::string title_of(const Given &given, size_t mesh) {
   return "mesh " + std::to_string(mesh) + " (\"" + text_of(given.meshes[mesh], "name").substr(0, 60) + "\")";
 }
 
-/* A mesh and the nodes that have it. */
-Culprits mesh_and_nodes(const Given &given, size_t mesh) {
-  Culprits out{culprit("meshes", given.meshes, mesh)};
-  const List nodes = array_of(given.document.root(), "nodes");
-  for (size_t n = 0; n < nodes.size(); n++) {
-    if (index_of(nodes[n], "mesh") == static_cast<int64_t>(mesh)) {
-      out.add(culprit("nodes", nodes, n));
-    }
-  }
-  return out;
-}
-
 /* Of each mesh its skin. */
 using Skins = std::map<size_t, int64_t, std::less<size_t>, Charged<std::pair<const size_t, int64_t>>>;
 
@@ -136,7 +124,7 @@ Skins skins_of(const Given &given, const Chosen &used) {
       throw Fault{ORB_E_BAD_OPTION,
                   "The nodes of " + title_of(given, found->first) +
                       " have several skins, and an asset can have one. Leave \"skin\" out.",
-                  mesh_and_nodes(given, found->first)};
+                  mesh_and_nodes(given.document.root(), found->first)};
     }
     found->second = skin;
   }
@@ -310,7 +298,7 @@ void read_targets(const Given &given, const orb_given_file &file, orb_given_targ
   }
 }
 
-using Integers = std::vector<int32_t, Charged<int32_t>>;
+using Integers = Counted<int32_t>;
 
 void read_triangles(const Given &given, const Block &block, Integers *triangles, Integers *materials) {
   int64_t index = whole(block.primitive, "indices", NONE);

@@ -149,22 +149,10 @@ struct Keeper {
     }
   }
 
-  /* A mesh and the nodes that have it. */
-  Culprits mesh_and_nodes(size_t mesh) const {
-    Culprits out{culprit("meshes", meshes, mesh)};
-    const List nodes = array_of(doc, "nodes");
-    for (size_t n = 0; n < nodes.size(); n++) {
-      if (index_of(nodes[n], "mesh") == static_cast<int64_t>(mesh)) {
-        out.add(culprit("nodes", nodes, n));
-      }
-    }
-    return out;
-  }
-
   [[noreturn]] void refuse_copies(size_t mesh) const {
     refuse("The scene shows " + title(mesh) + " " + std::to_string(showed[mesh]) +
                " times, and targets of a mesh move all its copies alike. Give each node a mesh of its own.",
-           mesh_and_nodes(mesh));
+           mesh_and_nodes(doc, mesh));
   }
 
   std::string title(size_t mesh) const {
@@ -218,7 +206,7 @@ struct Keeper {
       if (!std::isfinite(out[k])) {
         refuse(
             "A target is too large for float32 in the coordinates of " + title(mesh) + "; give its node another scale.",
-            mesh_and_nodes(mesh));
+            mesh_and_nodes(doc, mesh));
       }
     }
   }
@@ -353,7 +341,7 @@ struct Keeper {
 
   void widen_mesh(size_t m, Editor *editor) {
     const List primitives = array_of(meshes[m], "primitives");
-    const Frame frame(matrix[m], m, mesh_and_nodes(m));
+    const Frame frame(matrix[m], m, mesh_and_nodes(doc, m));
     size_t had = 0;
     int64_t from = first[m];
     for (size_t p = 0; p < primitives.size(); p++) {
@@ -414,7 +402,7 @@ struct Keeper {
         if (showed[m] > 1) {
           refuse_copies(m);
         }
-        blaming(mesh_and_nodes(m), [&] { widen_mesh(m, &editor); });
+        blaming(mesh_and_nodes(doc, m), [&] { widen_mesh(m, &editor); });
       }
     }
     if (!widen_weights(ctx, doc, buffers, widened, shapes, &editor)) {

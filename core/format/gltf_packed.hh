@@ -21,7 +21,7 @@ const double SHARE_ERROR = 1.0 / 64;
 
 class Packed {
  public:
-  using Octets = std::vector<unsigned char, Charged<unsigned char>>;
+  using Octets = Counted<unsigned char>;
 
   /* What an accessor of a compressed primitive holds; normalized components as fractions. */
   struct Values {

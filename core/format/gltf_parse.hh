@@ -17,7 +17,7 @@ class Document {
   size_t rest() const { return rest_; }
 
  private:
-  std::vector<char, Charged<char>> reserve_;
+  Counted<char> reserve_;
   Bytes chunk_;
   size_t rest_ = 0;
   std::unique_ptr<cJSON, void (*)(cJSON *)> root_;

@@ -69,7 +69,7 @@ void shift_node(cJSON *node, const double shift[3]) {
  * roots. shift: of each node, 3 numbers. */
 Indices copy_nodes(const Skeleton &from, cJSON *doc, const Matrix &wrap, const Numbers &shift) {
   Indices number(from.nodes.size(), NONE, Charged<int64_t>(from.ctx)), roots{Charged<int64_t>(from.ctx)};
-  std::vector<cJSON *, Charged<cJSON *>> copies{Charged<cJSON *>(from.ctx)};
+  Counted<cJSON *> copies{Charged<cJSON *>(from.ctx)};
   cJSON *nodes = array_in(doc, "nodes");
   int64_t next = cJSON_GetArraySize(nodes);
   for (int64_t n : from.kept) {

@@ -93,8 +93,11 @@ Counted<int64_t> roots_of(orb_context *ctx, const cJSON *doc, const List &nodes,
 Counted<Shown> shown_meshes(orb_context *ctx, const cJSON *doc, size_t mesh_count) {
   const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");
   Counted<Shown> out{Charged<Shown>(ctx)};
-  for (size_t i = 0; i < mesh_count && nodes.empty() && scenes.empty(); i++) {
-    out.push_back(Shown{static_cast<int64_t>(i), Matrix(), nullptr});
+  if (nodes.empty() && scenes.empty()) {
+    for (size_t i = 0; i < mesh_count; i++) {
+      out.push_back(Shown{static_cast<int64_t>(i), Matrix(), nullptr});
+    }
+    return out;
   }
   const Counted<int64_t> roots = roots_of(ctx, doc, nodes, scenes);
   Counted<Waiting> stack{Charged<Waiting>(ctx)};

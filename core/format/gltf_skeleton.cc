@@ -45,7 +45,7 @@ void Skeleton::link_nodes() {
 /* Goes up from each joint to a node that is done, and from there back down. */
 void Skeleton::place_nodes() {
   enum : unsigned char { NEW, OPEN, DONE };
-  std::vector<unsigned char, Charged<unsigned char>> state(nodes.size(), NEW, Charged<unsigned char>(ctx));
+  Counted<unsigned char> state(nodes.size(), NEW, Charged<unsigned char>(ctx));
   Indices path{Charged<int64_t>(ctx)};
   size_t steps = 0;
   for (int64_t joint : joints) {

@@ -7,8 +7,8 @@
 
 namespace gltf {
 
-using Matrices = std::vector<Matrix, Charged<Matrix>>;
-using Indices = std::vector<int64_t, Charged<int64_t>>;
+using Matrices = Counted<Matrix>;
+using Indices = Counted<int64_t>;
 
 const size_t NODES_A_CHECK = 4096; /* nodes or joints between two checks for cancellation */
 

@@ -183,6 +183,18 @@ inline Culprit culprit(const char *list, const List &items, size_t index) {
   return {list, index, index < items.size() ? text_of(items[index], "name") : std::string()};
 }
 
+/* A mesh and the nodes that have it. */
+inline Culprits mesh_and_nodes(const cJSON *doc, size_t mesh) {
+  Culprits out{culprit("meshes", array_of(doc, "meshes"), mesh)};
+  const List nodes = array_of(doc, "nodes");
+  for (size_t n = 0; n < nodes.size(); n++) {
+    if (index_of(nodes[n], "mesh") == static_cast<int64_t>(mesh)) {
+      out.add(culprit("nodes", nodes, n));
+    }
+  }
+  return out;
+}
+
 /* Reads an array member of exactly `count` numbers; false where it is absent. */
 inline bool numbers(const cJSON *object, const char *key, double *out, size_t count) {
   if (!member(object, key)) {

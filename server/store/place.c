@@ -121,14 +121,14 @@ static store_result open_url(const char *data, const char *url, int shared, cons
   return result;
 }
 
-static int has(const char *data, const char *name) {
+int place_has(const char *data, const char *name) {
   char path[PATH_MAX];
   path_in(data, name, path);
   return access(path, F_OK) == 0;
 }
 
 int place_is_unfinished(const char *data) {
-  return has(data, place_new_catalogue) && !place_has_catalogue(data) && !has(data, place_catalogue);
+  return place_has(data, place_new_catalogue) && !place_has_catalogue(data) && !place_has(data, place_catalogue);
 }
 
 /* A daemon would make an empty catalogue there, and then nothing would tell what is missing. */
@@ -136,7 +136,7 @@ static store_result refuse_unfinished(const char *data) {
   if (!place_is_unfinished(data)) {
     return STORE_OK;
   }
-  log_error(has(data, place_backup_mark)
+  log_error(place_has(data, place_backup_mark)
                 ? "%s is the folder of a backup that has not ended: name the data folder with --data"
                 : "a restore into %s has not ended: run orbmorphd restore again until it ends, or name another folder "
                   "with --data",
@@ -182,7 +182,7 @@ int place_has_files(const char *data) {
 }
 
 int place_has_catalogue(const char *data) {
-  return has(data, "catalogue.sqlite");
+  return place_has(data, "catalogue.sqlite");
 }
 
 /* Checks what can be checked before the catalogue is opened, which may create it. here: the mark of the data folder. */

@@ -29,6 +29,8 @@ store_result place_write_mark(const char *data, const char *name, const char mar
 /* The names of a catalogue that a backup or a restore makes, until all that it names is there, and of the file that
  * marks the folder of a backup. */
 extern const char place_new_catalogue[], place_backup_mark[];
+/* Whether the folder has an entry of this name. */
+int place_has(const char *data, const char *name);
 /* Whether a restore, or the first backup, into the folder has not ended: it has a new catalogue only. */
 int place_is_unfinished(const char *data);
 /* Whether the data folder has objects in files, and whether it has a catalogue in SQLite. */

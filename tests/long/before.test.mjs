@@ -3,24 +3,18 @@
 // A test fails where the attack succeeds. The first needs root and Linux on x86-64 (hurt.py).
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { readdirSync, readFileSync, statSync, truncateSync, writeFileSync } from 'node:fs';
+import { readdirSync, readFileSync, statSync, truncateSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { runProgram } from '../scenario/support/cli.mjs';
 import { binaries, daemon, endless, until } from '../scenario/support/daemon.mjs';
+import { flip, object } from '../scenario/support/objects.mjs';
 import { workers } from '../scenario/support/processes.mjs';
 import * as shapes from '../scenario/support/shapes.mjs';
 
 const mesh = (k) => shapes.obj(shapes.ball(1, ([x, y, z]) => [x + k, y, z]));
-const object = (d, kind, id) => path.join(d.data, 'objects', kind, id.slice(0, 2), id);
 const scrubs = ['--scrub-rate', '1G', '--scrub-seconds', '1']; // where the daemon has a scrub
-
-function flip(file) {
-  const bytes = readFileSync(file);
-  bytes[bytes.length >> 1] ^= 1;
-  writeFileSync(file, bytes);
-}
 
 /** The thread of a process that computes most within half a second. */
 async function busiest(pid) {
@@ -68,7 +62,7 @@ test('an asset is not served with a flipped bit', async (t) => {
   const morph = await d.made('/v1/supermeshes', request);
   const right = (await d.get(morph.asset)).bytes;
   await d.stop();
-  flip(object(d, 'asset', morph.id));
+  flip(object(d.data, 'asset', morph.id));
   await d.start();
   const reply = await d.get(morph.asset);
   assert.ok(reply.status === 404 || reply.bytes.equals(right), `${reply.status}: the bytes with the flipped bit`);
@@ -115,6 +109,6 @@ test('--check-data reports such files, and --gc deletes none of them', async (t)
 test('the daemon reports a damaged file that nobody requests', async (t) => {
   const d = await daemon(t, { args: scrubs });
   const { json } = await d.upload(mesh(0));
-  flip(object(d, 'mesh', json.id));
+  flip(object(d.data, 'mesh', json.id));
   await until(() => new RegExp(`"level":"(warn|error)".*${json.id}`).test(d.log), 'a line of the log about it', 20);
 });

@@ -4,9 +4,10 @@ import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync, readdirSync, readFileSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
-import { mesh, object, sha256, trap, watching } from './support/backup.mjs';
+import { mesh, sha256, trap, watching } from './support/backup.mjs';
 import { folder, runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, Daemon, daemon, endless, until } from './support/daemon.mjs';
+import { object } from './support/objects.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const run = (...args) => runProgram(binaries.daemon, args);

@@ -4,6 +4,7 @@ import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
 import { assertProblem, daemon } from './support/daemon.mjs';
+import { flip, object } from './support/objects.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** Changes one digit of a stored mesh, so that it is still a mesh of the same size. */
@@ -31,15 +32,6 @@ for (const isolate of ['on', 'off'])
     assert.equal(await quarantined(d), 1);
   });
 
-/** Flips one bit in the middle of a stored file, which keeps its size. */
-function flip(d, kind, id) {
-  const file = path.join(d.data, 'objects', kind, id.slice(0, 2), id);
-  const bytes = readFileSync(file);
-  bytes[bytes.length >> 1] ^= 1;
-  writeFileSync(file, bytes);
-  return bytes;
-}
-
 const quarantined = async (d) =>
   Number(/^orbmorph_objects_quarantined_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
 
@@ -63,7 +55,7 @@ test('a flipped bit is found when an object is first served after a start', asyn
 
   // Sending a mesh again restores it.
   await d.stop();
-  const bad = flip(d, 'mesh', meshes[0].id);
+  const bad = flip(object(d.data, 'mesh', meshes[0].id));
   await d.start();
   for (let turn = 0; turn < 2; turn++) assertProblem(await d.get(`${meshes[0].url}/file`), 500, 'internal');
   assert.equal(await quarantined(d), 1, 'counted once');
@@ -79,7 +71,7 @@ test('a flipped bit is found when an object is first served after a start', asyn
   // at the next request.
   for (const [kind, url, resource] of made) {
     await d.stop();
-    flip(d, kind, resource.split('/').pop());
+    flip(object(d.data, kind, resource.split('/').pop()));
     await d.start();
     const reply = await d.get(url);
     if (kind === 'quantized') assert.deepEqual(reply.bytes, right.get(url), kind);

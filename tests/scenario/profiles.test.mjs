@@ -10,6 +10,7 @@ import { setTimeout as sleep } from 'node:timers/promises';
 import { signUrl } from '../../client/js/src/index.js';
 import { runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, daemon, until } from './support/daemon.mjs';
+import { object } from './support/objects.mjs';
 import * as shapes from './support/shapes.mjs';
 
 async function pair(d, levels = 3) {
@@ -20,7 +21,6 @@ async function pair(d, levels = 3) {
 }
 const recipe = (ids) => `/v1/morph.glb?shapes=${ids}&tolerance=0.01&align=rotate`;
 const idOf = (reply) => /supermeshes\/(\w+)/.exec(reply.headers.get('link'))[1];
-const object = (d, profile, id) => path.join(d.data, 'objects', profile, id.slice(0, 2), id);
 const made = (d, profile) => d.log.split(`profile ${profile} made`).length - 1;
 const stored = async (d) =>
   Number(/^orbmorph_stored_bytes (\S+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
@@ -60,7 +60,7 @@ test('both routes serve each profile, which is made once', async (t) => {
     const share = whole.bytes.length / full;
     assert.ok(share < (profile === 'meshopt' ? 0.63 : 0.8), `${profile}: ${share}`);
     assert.equal(await stored(d), before + whole.bytes.length, 'its bytes count');
-    assert.equal(statSync(object(d, profile, id)).size, whole.bytes.length);
+    assert.equal(statSync(object(d.data, profile, id)).size, whole.bytes.length);
     tags.add(etag);
     // Ranges and conditions.
     const part = await d.get(`${url}&profile=${profile}`, { headers: { range: 'bytes=0-3' } });
@@ -88,12 +88,12 @@ test('both routes serve each profile, which is made once', async (t) => {
   assert.equal(made(d, 'meshopt'), times);
 
   // The daemon makes a lost file again, and finds damage.
-  rmSync(object(d, 'meshopt', id));
+  rmSync(object(d.data, 'meshopt', id));
   assert.ok((await d.get(`${url}&profile=meshopt`)).bytes.equals(bytes));
-  rmSync(object(d, 'meshopt', id));
+  rmSync(object(d.data, 'meshopt', id));
   assert.ok((await d.get(`/v1/supermeshes/${id}/asset.glb?profile=meshopt`)).bytes.equals(bytes));
   await d.stop();
-  truncateSync(object(d, 'quantized', id), 1000);
+  truncateSync(object(d.data, 'quantized', id), 1000);
   const found = check();
   assert.equal(found.status, 1);
   assert.match(found.stdout, /its profile "quantized" \(1000 bytes\) does not match its hash/);
@@ -102,7 +102,7 @@ test('both routes serve each profile, which is made once', async (t) => {
   // Profiles are deleted with the supermesh.
   assert.equal((await d.delete(`/v1/supermeshes/${id}`)).status, 204);
   for (const profile of ['quantized', 'meshopt']) {
-    assert.ok(!existsSync(object(d, profile, id)));
+    assert.ok(!existsSync(object(d.data, profile, id)));
     assertProblem(await d.get(`/v1/supermeshes/${id}/asset.glb?profile=${profile}`), 404, 'not-found');
   }
 });

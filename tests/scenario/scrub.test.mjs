@@ -17,18 +17,12 @@ import path from 'node:path';
 import test from 'node:test';
 import { folder, runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, daemon, until } from './support/daemon.mjs';
+import { flip, object } from './support/objects.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const run = (...args) => runProgram(binaries.daemon, args);
-const object = (d, kind, id) => path.join(d.data, 'objects', kind, id.slice(0, 2), id);
 const mesh = (k) => shapes.obj(shapes.ball(1, ([x, y, z]) => [x + k, y, z]));
 const fast = ['--scrub-rate', '1G', '--scrub-seconds', '1'];
-
-function flip(file) {
-  const bytes = readFileSync(file);
-  bytes[bytes.length >> 1] ^= 1;
-  writeFileSync(file, bytes);
-}
 
 const integrity = async (d) => (await d.get('/readyz?verbose')).json.integrity;
 const metric = async (d, name) =>
@@ -56,7 +50,7 @@ test('the scrub finds and reports damage to files that nobody requests, and it c
   assert.ok(found.scrubbed_objects >= 2 + 2 + 3, JSON.stringify(found)); // meshes, embeddings, parts of the morph
 
   // A mesh: only its owner has its file, so it stays missing until the owner sends it again.
-  flip(object(d, 'mesh', meshes[0].id));
+  flip(object(d.data, 'mesh', meshes[0].id));
   found = await round(d);
   assert.deepEqual([found.quarantined, found.missing], [1, 1]);
   assert.equal(await metric(d, 'orbmorph_objects_missing'), 1);
@@ -71,13 +65,13 @@ test('the scrub finds and reports damage to files that nobody requests, and it c
   // Results of jobs: the row is deleted with the damaged object, so the same request computes it again.
   let wrong = 1;
   for (const kind of ['asset', 'places', 'spheres']) {
-    flip(object(d, kind, morph.id));
+    flip(object(d.data, kind, morph.id));
     await until(async () => (await d.get(morph.url)).status === 404, `${kind} is found`);
     await d.made('/v1/supermeshes', request);
     for (const [i, url] of urls.entries()) assert.deepEqual((await d.get(url)).bytes, right[i], `${kind}: ${url}`);
     assert.equal((await integrity(d)).quarantined, ++wrong);
   }
-  flip(object(d, 'sphere', embedding.id));
+  flip(object(d.data, 'sphere', embedding.id));
   await until(async () => (await d.get(embedding.url)).status === 404, 'the sphere is found');
   await d.made('/v1/embeddings', { mesh: embedding.mesh });
   assert.deepEqual((await d.get(embedding.sphere)).bytes, right[3]);
@@ -102,8 +96,8 @@ test('a morph by URL whose asset or embedding was damaged is computed again with
   assert.deepEqual((await integrity(d)).scrubs, 0, 'off');
   for (const [query, bytes] of right) {
     await d.stop();
-    flip(object(d, 'asset', id));
-    if (query) rmSync(object(d, query.split('=')[1], id), { force: true });
+    flip(object(d.data, 'asset', id));
+    if (query) rmSync(object(d.data, query.split('=')[1], id), { force: true });
     await d.start();
     const reply = await d.get(url + query);
     assert.equal(reply.status, 200, `${query}: ${reply.bytes}`);
@@ -111,7 +105,7 @@ test('a morph by URL whose asset or embedding was damaged is computed again with
   }
   // The job that needs a damaged embedding computes it again.
   const [embedding] = (await d.get('/v1/embeddings')).json.embeddings;
-  flip(object(d, 'sphere', embedding.id));
+  flip(object(d.data, 'sphere', embedding.id));
   assert.equal((await d.get(`${url}&tolerance=0.01`)).status, 200);
   assert.equal((await integrity(d)).quarantined, 2, '1 in the last start, and the embedding');
 });
@@ -165,7 +159,7 @@ test('meshes whose rows a cut WAL lost are reported, and --gc keeps their files 
     assert.equal((await run('--gc', '--data', d.data)).code, 0);
     for (const id of lost.slice(1)) assert.equal(readFileSync(aside(id), 'utf8'), texts[ids.indexOf(id)]);
   }
-  assert.equal(existsSync(object(d, 'mesh', lost[1])), false);
+  assert.equal(existsSync(object(d.data, 'mesh', lost[1])), false);
 
   // Files that have been there for longer than lost-days are deleted, and no sooner.
   const day = 86400;

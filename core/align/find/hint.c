@@ -60,20 +60,29 @@ orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *plac
   return ORB_OK;
 }
 
-/* Distances along copy s between the first `sources` landmarks and all: sources × count. */
-static orb_status measure(orb_context *ctx, const orb_hint_places *places, const orb_mesh *mesh, int s, int32_t sources,
-                          double *out) {
+orb_status orb_hint_distances(orb_context *ctx, const orb_hint_places *places, const orb_mesh *mesh, int s,
+                              int32_t sources, double *out) {
   orb_distances distances = {0};
-  double *from = ORB_NEW(ctx, double, mesh->vertex_count);
-  orb_status status = from ? orb_distances_create(ctx, mesh, &distances) : ORB_E_NO_MEMORY;
+  orb_status status = orb_distances_create(ctx, mesh, &distances);
   for (int32_t i = 0; i < sources && status == ORB_OK; i++) {
-    orb_distances_from(&distances, places->vertex[s][i], from);
-    for (int32_t k = 0; k < places->few; k++) {
-      out[(size_t)i * (size_t)places->few + (size_t)k] = from[places->vertex[s][k]];
-    }
+    orb_distances_from(&distances, places->vertex[s][i], out + (size_t)i * (size_t)mesh->vertex_count);
     status = orb_context_check(ctx);
   }
   orb_distances_free(ctx, &distances);
+  return status;
+}
+
+/* Distances along copy s between the first `sources` landmarks and the first few: sources × few. */
+static orb_status measure(orb_context *ctx, const orb_hint_places *places, const orb_mesh *mesh, int s, int32_t sources,
+                          double *out) {
+  const size_t n = (size_t)mesh->vertex_count;
+  double *from = ORB_NEW(ctx, double, (size_t)sources *n);
+  orb_status status = from ? orb_hint_distances(ctx, places, mesh, s, sources, from) : ORB_E_NO_MEMORY;
+  for (int32_t i = 0; i < sources && status == ORB_OK; i++) {
+    for (int32_t k = 0; k < places->few; k++) {
+      out[(size_t)i * (size_t)places->few + (size_t)k] = from[(size_t)i * n + (size_t)places->vertex[s][k]];
+    }
+  }
   orb_free(ctx, from);
   return status;
 }

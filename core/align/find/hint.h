@@ -33,6 +33,11 @@ void orb_hint_places_free(orb_context *ctx, orb_hint_places *places);
 ORB_MUST_CHECK orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *places, const orb_mesh *copy,
                                                   orb_elastic_anchor **out);
 
+/* Distances along copy s from each of the first `sources` landmarks to all vertices: sources × vertices of `mesh`,
+ * which is that of the copy. O(sources · n log n). */
+ORB_MUST_CHECK orb_status orb_hint_distances(orb_context *ctx, const orb_hint_places *places, const orb_mesh *mesh,
+                                             int s, int32_t sources, double *out);
+
 /* The mean of |ln(d/d')| over pairs of landmarks that are far apart, where d and d' are their distances along the two
  * surfaces, of equal areas: 0 for one body in two poses. INFINITY if no two are far apart. O(n log n). */
 ORB_MUST_CHECK orb_status orb_hint_stretch(orb_context *ctx, const orb_hint_places *places,

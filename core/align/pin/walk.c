@@ -411,20 +411,20 @@ static orb_status walk_together(orb_context *ctx, company *all, int *stuck) {
     }
   }
   ORB_TRY(run_stage(ctx, all, finish_one, 1));
-  *stuck = 0;
   for (int32_t s = 0; s < all->shape_count; s++) {
-    *stuck |= !all->good[s];
+    if (!all->good[s]) {
+      return ORB_OK;
+    }
   }
-  if (all->last && !*stuck) {
-    *stuck = 1; /* should this fail */
+  if (all->last) {
     ORB_TRY(hand_over(&all->walkers[all->shape_count - 1], all->last));
-    *stuck = 0;
   }
-  for (int32_t s = 0; s < all->shape_count - (all->last != NULL) && !*stuck; s++) {
+  for (int32_t s = 0; s < all->shape_count - (all->last != NULL); s++) {
     double *old = all->sheets[s].shape.points;
     all->sheets[s].shape.points = all->points[s];
     all->points[s] = old;
   }
+  *stuck = 0;
   return ORB_OK;
 }
 

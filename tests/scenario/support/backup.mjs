@@ -4,12 +4,10 @@ import assert from 'node:assert/strict';
 import { spawn, spawnSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
 import { readFileSync, renameSync } from 'node:fs';
-import path from 'node:path';
 import { setImmediate as turn, setTimeout as sleep } from 'node:timers/promises';
 import { binaries, patience, until } from './daemon.mjs';
 import * as shapes from './shapes.mjs';
 
-export const object = (data, kind, id) => path.join(data, 'objects', kind, id.slice(0, 2), id);
 export const mesh = (k) => shapes.obj(shapes.ball(2, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(5 * y + k)), 1.5 * y, z]));
 export const sha256 = (bytes) => createHash('sha256').update(bytes).digest('hex');
 const now = () => performance.now();

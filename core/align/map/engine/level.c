@@ -14,8 +14,8 @@
 static const double MEAN_SHARE = 1e-3;
 enum { LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 }; /* vertices between checks for cancellation, and of one task */
 enum {
-  PART_LEAST = 500, /* vertices of a part; with half as many, a colour of a part often fills no vector, and sweeps take
-                       a tenth more processor time */
+  PART_LEAST = 500, /* vertices of a part: two alignments of docs/bench-first-answer.md take a tenth more processor time
+                       with 350, and coarse levels of 1,000 vertices are not shared with 700 */
   PARTS_MOST = 64   /* as many as threads. Parts depend on the level alone, so that results do not depend on threads */
 };
 

@@ -17,7 +17,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { STEP_GRAIN = 32 }; /* vertices of a chunk: a multiple of all lanes */
+enum {
+  STEP_GRAIN = 32
+}; /* vertices of a chunk of the border: a multiple of all lanes, so that only the last is not full */
 
 typedef struct sweep_run {
   const orb_map_loops *loops;

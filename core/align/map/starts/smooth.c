@@ -31,11 +31,6 @@ typedef struct smoothing {
   smooth_edge *edge; /* to the neighbours, in that order */
 } smoothing;
 
-/* Vertices of one colour do not depend on each other, so their steps overlap in the processor. */
-static int32_t moving_count(const orb_map_level *l) {
-  return l->moving;
-}
-
 static double bounded(const smoothing *s, double cotangent) {
   return fmin(fmax(cotangent, s->params->smooth.least_cotangent), s->params->smooth.most_cotangent);
 }
@@ -66,14 +61,15 @@ static int32_t fill_row(const smoothing *s, int32_t v, smooth_edge *out) {
 static void fill_edges(const smoothing *s) {
   const orb_map_level *l = s->level;
   int32_t count = 0;
-  for (int32_t i = 0; i < moving_count(l); i++) {
+  for (int32_t i = 0; i < l->moving; i++) {
     s->row[i] = count;
     count += fill_row(s, l->by_group[i], s->edge + count);
   }
-  s->row[moving_count(l)] = count;
+  s->row[l->moving] = count;
 }
 
-/* Moves the i-th vertex of by_group to the mean of its target and its neighbours. */
+/* Moves the i-th vertex of by_group to the mean of its target and its neighbours. Vertices of one colour follow each
+ * other and do not depend on each other, so their steps overlap in the processor. */
 static void relax(const smoothing *s, int32_t i) {
   const orb_map_level *l = s->level;
   const int32_t v = l->by_group[i];
@@ -141,7 +137,7 @@ static orb_status smoothing_create(orb_context *ctx, smoothing *s) {
   s->trust = ORB_NEW(ctx, double, l->count);
   s->smooth = ORB_NEW(ctx, double, l->count);
   s->point = ORB_NEW0(ctx, double, 4 * (size_t)l->count);
-  s->row = ORB_NEW(ctx, int32_t, (size_t)moving_count(l) + 1);
+  s->row = ORB_NEW(ctx, int32_t, (size_t)l->moving + 1);
   s->edge = ORB_NEW(ctx, smooth_edge, 3 * (size_t)l->triangle_count);
   if (!s->target || !s->trust || !s->smooth || !s->point || !s->row || !s->edge) {
     return ORB_E_NO_MEMORY;
@@ -171,7 +167,7 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l, const int32_t *to_me
   doubt_outliers(&s, c->doubted, to_mesh);
   for (int round = 0; round < p->smooth.rounds; round++) {
     for (int sweep = 0; sweep < p->smooth.sweeps; sweep++) {
-      for (int32_t i = 0; i < moving_count(l); i++) {
+      for (int32_t i = 0; i < l->moving; i++) {
         relax(&s, i);
       }
       ORB_GO(status, orb_context_check(c->ctx), done);
@@ -179,7 +175,7 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l, const int32_t *to_me
     doubt_folds(&s);
     weigh(&s);
   }
-  for (int32_t i = 0; i < moving_count(l); i++) {
+  for (int32_t i = 0; i < l->moving; i++) {
     double *x = l->x + 3 * (size_t)l->by_group[i];
     memcpy(x, s.point + 4 * (size_t)l->by_group[i], sizeof(double[3]));
     orb_normalize(x);
