@@ -72,26 +72,32 @@ cpu_of() {
   echo $(((${12} + ${13}) / $(getconf CLK_TCK)))
 }
 
-# Runs a target. When the time is up, SIGUSR1 makes the fuzzer end with its statistics.
+# Runs a target. When the time is up, SIGUSR1 makes the fuzzer end with its statistics. With --cpu no limit of the fuzzer
+# counts wall time, for it may wait for a core; an input that still runs after HANGS CPU seconds more is a finding: SIGABRT
+# makes the fuzzer keep it. The targets themselves abort at an input that costs too much CPU time (cost.h).
+HANGS=60
 one() {
   local name=$1 seconds=$2 unit=$3 log=build-fuzz/corpus/$1.log began=build-fuzz/corpus/$1.began status=0 used=0 limit=$2
-  local fuzzer now runs cov kept times
+  local fuzzer now runs cov kept times slow=60 signal=USR1
   mkdir -p "build-fuzz/corpus/$name"
   touch "$began"
-  [ "$unit" = wall ] || limit=0
+  [ "$unit" = wall ] || limit=0 slow=0
   TIMEFORMAT='%R s wall, %U s user, %S s system'
   { time {
       build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -max_total_time="$limit" -rss_limit_mb=2048 -seed="${ORB_FUZZ_SEED:-0}" \
-        -timeout=$([ "$unit" = wall ] && echo 60 || echo 1200) -report_slow_units=1200 -print_final_stats=1 \
+        -timeout=$slow -report_slow_units=1000000 -print_final_stats=1 \
         -artifact_prefix="build-fuzz/found/$name-" "build-fuzz/corpus/$name" "build-fuzz/seeds/$name" &
       fuzzer=$!
       trap 'kill $fuzzer 2>/dev/null' HUP INT TERM
       if [ "$unit" = cpu ]; then
-        while now=$(cpu_of $fuzzer) && [ "$now" -lt "$seconds" ]; do
+        while now=$(cpu_of $fuzzer); do
           used=$now
+          if [ "$now" -ge "$seconds" ]; then
+            kill -$signal $fuzzer 2>/dev/null || true
+            [ "$now" -lt $((seconds + HANGS)) ] || signal=ABRT
+          fi
           sleep 1
         done
-        kill -USR1 $fuzzer 2>/dev/null || true
       fi
       wait $fuzzer || status=$?
       if kill -0 $fuzzer 2>/dev/null; then # a signal has interrupted the wait
@@ -173,5 +179,5 @@ if [ $unit = keep ]; then
   exit
 fi
 export -f one cpu_of
-export is_stopped
+export is_stopped HANGS
 printf '%s\n' "${targets[@]}" | xargs -P $(($(nproc) + 1)) -I{} bash -c "one {} $amount $unit"
