@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -11,28 +12,43 @@
 
 enum { LANDMARKS = 8 };
 
-/* The corners of a cube, and the same points with each axis scaled. */
-static int is_part(const double scale[3], int32_t landmarks) {
-  double moving[3 * LANDMARKS], fixed[3 * LANDMARKS];
-  int32_t vertex[LANDMARKS];
+/* The corners of a cube, and the same points with each axis scaled, each on a surface of one triangle whose area is 1.
+ */
+static orb_map_part part_of(const double scale[3], int32_t landmarks) {
+  double positions[2][3 * (LANDMARKS + 3)] = {{0}};
+  int32_t vertex[LANDMARKS], triangle[3] = {LANDMARKS, LANDMARKS + 1, LANDMARKS + 2};
+  const double corner[9] = {0, 0, 0, 2, 0, 0, 0, 1, 0};
+  orb_aligned_shape shape[2] = {0};
   orb_context *ctx;
-  int part = -1;
+  orb_map_part part = ORB_MAP_NO_PART;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
   for (int i = 0; i < LANDMARKS; i++) {
     vertex[i] = i;
     for (int k = 0; k < 3; k++) {
-      moving[3 * i + k] = (i >> k & 1) - 0.5;
-      fixed[3 * i + k] = scale[k] * moving[3 * i + k];
+      positions[1][3 * i + k] = (i >> k & 1) - 0.5;
+      positions[0][3 * i + k] = scale[k] * positions[1][3 * i + k];
     }
   }
-  orb_map_run run = {.ctx = ctx,
-                     .params = orb_map_params_of(ORB_PRESET_DEFAULT),
-                     .pairs = {.count = landmarks, .landmarks = landmarks, .moving = vertex, .fixed = vertex},
-                     .x = moving};
-  run.b.x = fixed;
-  assert_int_equal(orb_map_is_part(&run, &part), ORB_OK);
+  for (int s = 0; s < 2; s++) {
+    memcpy(positions[s] + 3 * LANDMARKS, corner, sizeof corner);
+    shape[s].mesh = (orb_mesh){
+        .positions = positions[s], .vertex_count = LANDMARKS + 3, .triangles = triangle, .triangle_count = 1};
+    shape[s].landmark_vertices = vertex;
+  }
+  const orb_map_params params = orb_map_params_of(ORB_PRESET_DEFAULT);
+  assert_int_equal(orb_map_find_part(ctx, &params, &shape[0], &shape[1], landmarks, &part), ORB_OK);
   orb_context_destroy(ctx);
   return part;
+}
+
+static int is_part(const double scale[3], int32_t landmarks) {
+  return part_of(scale, landmarks) != ORB_MAP_NO_PART;
+}
+
+static void the_part_is_the_shape_with_longer_distances(void **state) {
+  (void)state;
+  assert_int_equal(part_of((const double[3]){1.5, 1.5, 1.5}, LANDMARKS), ORB_MAP_PART_IS_FIXED);
+  assert_int_equal(part_of((const double[3]){0.6, 0.6, 0.6}, LANDMARKS), ORB_MAP_PART_MOVES);
 }
 
 static void landmarks_of_another_scale_show_a_part(void **state) {
@@ -53,7 +69,8 @@ static void other_landmarks_show_no_part(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(landmarks_of_another_scale_show_a_part),
+  const struct CMUnitTest tests[] = {cmocka_unit_test(the_part_is_the_shape_with_longer_distances),
+                                     cmocka_unit_test(landmarks_of_another_scale_show_a_part),
                                      cmocka_unit_test(other_landmarks_show_no_part)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

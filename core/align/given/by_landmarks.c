@@ -55,7 +55,7 @@ static int32_t list_landmarks(const orb_landmark *landmarks, const orb_alignment
 /* The result of a match before anything is pinned. */
 typedef struct posed {
   orb_alignment alignment; /* empty, unless it is found */
-  double worst;            /* the largest energy of its maps */
+  double worst;            /* the largest energy of its maps, before they are fitted in space */
   int is_found;
   int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body */
 } posed;
@@ -75,6 +75,7 @@ typedef struct two_ways {
   const orb_align_options *options;
   posed posed;
   orb_alignment pinned; /* once has_tried_pins; empty if the pins have no room */
+  double loose;         /* the energy of its map before that is fitted in space */
   int has_tried_pins, lacks_room;
   int fits_part; /* that map is drawn to where parts of the shapes fit, so its energy does not compare */
   int walked;    /* the pins of two shapes meet in a map that a landmark walk has led to */
@@ -94,7 +95,7 @@ static orb_status try_pins(two_ways *c) {
   if (status != ORB_OK) {
     return c->lacks_room ? ORB_OK : status;
   }
-  a->energy = INFINITY;
+  a->energy = c->loose = INFINITY;
   if (c->shape_count == 2) {
     orb_map_course course = {0};
     const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK, .fits_parts = 1, .course = &course};
@@ -102,6 +103,7 @@ static orb_status try_pins(two_ways *c) {
     ORB_TRY(orb_compose(c->ctx, &a->shapes[0], &a->shapes[1], 1, a->landmark_count, &walk, c->options->preset, energies,
                         &c->walked));
     a->energy = energies[1];
+    c->loose = fmin(energies[1], course.loose);
     c->fits_part = course.fits_part;
   }
   return ORB_OK;
@@ -112,7 +114,7 @@ static orb_status ask_pins(void *user, double energy, int *goes_on) {
   two_ways *c = user;
   ORB_TRY(try_pins(c));
   const double poor = orb_map_params_of(c->options->preset).energy.poor;
-  *goes_on = !c->walked || c->pinned.energy > poor || c->pinned.energy > ORB_FIND_POSED_BEATEN * energy;
+  *goes_on = !c->walked || c->loose > poor || c->loose > ORB_FIND_POSED_BEATEN * energy;
   return ORB_OK;
 }
 
@@ -130,6 +132,7 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
   int32_t *vertex[2] = {ORB_NEW(ctx, int32_t, count), ORB_NEW(ctx, int32_t, count)};
   orb_match match = {0};
   double energies[2] = {INFINITY, INFINITY};
+  orb_map_course course = {0};
   int improved = 0;
   orb_status status = vertex[0] && vertex[1] ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
@@ -154,14 +157,15 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
                                  .target = match.target,
                                  .fits_parts = 1,
                                  .keeps_angles = keeps_angles,
+                                 .course = &course,
                                  .rival = {competes ? ask_pins : NULL, c},
-                                 .beat = {.energy = walks_first && c->walked ? c->pinned.energy : 0},
+                                 .beat = {.energy = walks_first && c->walked ? c->loose : 0},
                                  .walks_first = walks_first};
     ORB_GO(status, orb_compose(ctx, fixed, moving, walks_first, count, &guide, preset, energies, &improved), done);
   }
   const double energy = improved ? energies[1] : INFINITY;
   a->energy += energy / (a->shape_count - 1);
-  p->worst = fmax(p->worst, energy);
+  p->worst = fmax(p->worst, fmin(energy, improved ? course.loose : INFINITY));
 done:
   orb_match_free(ctx, &match);
   orb_free(ctx, vertex[0]);
@@ -213,12 +217,20 @@ static orb_status try_pose(two_ways *c, double sure) {
   return orb_alignment_lacks_room(c->ctx, status) ? ORB_OK : status;
 }
 
-/* Leaves the better of the two in c->pinned. */
+/* Leaves the better of the two in c->pinned. Energies compare as long as maps are not fitted in space, and one of the
+ * two may be fitted alone. */
 static void keep_better(two_ways *c) {
-  if (c->posed.is_found) {
-    orb_alignment_keep_better(c->ctx, &c->pinned, &c->posed.alignment);
-    c->posed.is_found = 0;
+  posed *p = &c->posed;
+  if (!p->is_found) {
+    return;
   }
+  if (p->worst < c->loose) {
+    orb_alignment_free(c->ctx, &c->pinned);
+    c->pinned = p->alignment;
+    c->loose = p->worst;
+    memset(&p->alignment, 0, sizeof p->alignment);
+  }
+  posed_free(c->ctx, p);
 }
 
 /* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. If its map is poor, a
@@ -233,10 +245,10 @@ static orb_status improve(two_ways *c) {
     posed_free(c->ctx, p);
     return ORB_OK;
   }
-  if (p->is_unsure && !p->is_found && c->pinned.energy > poor) {
+  if (p->is_unsure && !p->is_found && c->loose > poor) {
     ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH_MOST));
   }
-  const double energy = c->pinned.energy;
+  const double energy = c->loose;
   const int agree = c->walked && fabs(p->worst - energy) <= ORB_FIND_POSED_AGREE * energy;
   const int is_done =
       p->is_found ? fmin(energy, p->worst) <= ORB_FIND_POSED_POOR || agree : c->walked || energy <= good;
@@ -245,6 +257,7 @@ static orb_status improve(two_ways *c) {
   }
   if (preset == ORB_PRESET_QUALITY || !is_done) {
     ORB_TRY(orb_compose_all(c->ctx, &c->pinned, ORB_MAP_FROM_SPACE, NULL, preset));
+    c->loose = fmin(c->loose, c->pinned.energy);
   }
   keep_better(c);
   return ORB_OK;

@@ -42,6 +42,7 @@
 #include "align/map/engine/run.h"
 #include "align/map/levels.h"
 #include "align/map/lifted.h"
+#include "align/map/space/part.h"
 #include "align/map/start.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
@@ -223,11 +224,23 @@ done:
 
 /* The last steps. before: the energy of the map as given. */
 static orb_status untwist_and_fit(orb_map_run *c, orb_map_from from, double before) {
+  c->course.loose = fmin(c->best_energy, c->kept.points ? c->kept.energy : INFINITY);
   if (orb_map_run_is_hopeless(c) || (from == ORB_MAP_FROM_WALK && !(c->best_energy < before))) {
     return ORB_OK;
   }
   ORB_TRY(orb_map_untwist(c, INFINITY));
+  c->course.loose = fmin(c->course.loose, c->best_energy);
   return orb_map_run_fit(c, from, before);
+}
+
+/* Should the shapes change places? A part moves better onto its whole than the other way: what it is not to cover has
+ * room around it. With 24 landmarks, what the draw of a bust to a head leaves behind is the neck. */
+static orb_status choose_moving(orb_context *ctx, const orb_map_params *params, const orb_aligned_shape *fixed,
+                                const orb_aligned_shape *moving, int32_t landmark_count, int *swap) {
+  orb_map_part part;
+  ORB_TRY(orb_map_find_part(ctx, params, fixed, moving, landmark_count, &part));
+  *swap = part == ORB_MAP_PART_IS_FIXED;
+  return part == ORB_MAP_NO_PART ? orb_map_should_swap(ctx, params, fixed, moving, swap) : ORB_OK;
 }
 
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
@@ -237,7 +250,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   int swap = 0;
   *improved = 0;
   if (both && !guide->target && fixed->mesh.vertex_count <= params.copies.large) {
-    ORB_TRY(orb_map_should_swap(ctx, &params, fixed, moving, &swap));
+    ORB_TRY(choose_moving(ctx, &params, fixed, moving, guide->fits_parts ? landmark_count : 0, &swap));
   }
   if (swap) {
     orb_aligned_shape *other = fixed;

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "align/map/engine/clear.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/levels.h"
 #include "base/check.h"

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/clear.h"
 #include "align/map/engine/near.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/levels.h"
@@ -25,10 +26,11 @@ static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level
 static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
                               int32_t *flips, int *given_up) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  int32_t hopeless = l->triangle_count / c->hopeless_flips;
+  const int32_t hopeless = l->triangle_count / c->hopeless_flips;
+  const double before = orb_map_level_energy(l);
   *flips = orb_map_level_flips(l);
   if (*flips <= hopeless) {
-    *given_up = orb_map_level_energy(l) > c->hopeless;
+    *given_up = before > c->hopeless;
     if (*given_up) {
       c->work -= c->params.work.given_up * (int64_t)c->vertex_count;
       return ORB_OK;
@@ -43,7 +45,8 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
     ORB_TRY(orb_map_keep_usable(c, l, to_mesh));
     ORB_TRY(orb_map_release(c, l, to_mesh, flips));
   }
-  *given_up = *flips ? last || *flips > hopeless : orb_map_level_degree(l) != 1;
+  c->is_crumpled = !*flips && orb_map_level_energy(l) > c->crumpled * before;
+  *given_up = *flips ? last || *flips > hopeless : c->is_crumpled || orb_map_level_degree(l) != 1;
   return ORB_OK;
 }
 

@@ -1,11 +1,12 @@
 /* Without landmarks, the targets are smoothed first, by a registration in space through samples of them, if the first
  * level then has fewer flips. A start from them is nearly always a map, landmarks held: unfolding (engine/unfold.h)
  * clears the remaining flips. Where the targets are folded, the map is crumpled, for example in the pockets of a face
- * and where limbs touch. So it is ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples.
- * If that leads to no map of shapes that correspond, passes through samples of the best map follow. Then come two more
- * starts, until one is such a map: from the targets as given on a coarser level, and on the usual level from the
- * targets that the first start has not followed. Then passes and a draw bring the energy down. Passes come first: they
- * find a better basin, and a draw only the bottom of one. If no pass helps, the map is drawn to the given targets.
+ * and where limbs touch. If it is crumpled much, it begins anew on a coarser level, where folds have fewer triangles.
+ * It is ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples. If that leads to no map
+ * of shapes that correspond, passes through samples of the best map follow. Then come two more starts, until one is
+ * such a map: from the targets as given on a coarser level, and on the usual level from the targets that the first
+ * start has not followed. Then passes and a draw bring the energy down. Passes come first: they find a better basin,
+ * and a draw only the bottom of one. If no pass helps, the map is drawn to the given targets.
  *
  * If none of these gives such a map, samples of the targets guide landmark walks (walked.h). A walk begins without
  * flips and is optimised on a coarse level, so several are tried, and the best one is refined. Such shapes are of other
@@ -76,14 +77,33 @@ static orb_status start_from_others(orb_map_run *c) {
   return orb_map_run_start(c, ORB_MAP_SPATIAL);
 }
 
-/* From the targets on a coarser level. */
+/* From the targets on a coarser level. Folds have fewer triangles there, and leave fewer crumples. */
 static orb_status start_coarser(orb_map_run *c) {
   const int32_t usual = c->params.level.spatial;
   allow(c);
+  c->has_started_coarser = 1;
   c->params.level.spatial = c->params.level.given;
   orb_status status = orb_map_run_start(c, ORB_MAP_SPATIAL);
   c->params.level.spatial = usual;
   return status;
+}
+
+/* The first start from targets. If its folds leave it crumpled, a coarser one comes first. */
+static orb_status start_spatial(orb_map_run *c) {
+  const double before = c->best_energy;
+  c->crumpled = c->params.targets.folded;
+  orb_status status = orb_map_run_start(c, ORB_MAP_SPATIAL);
+  c->crumpled = INFINITY;
+  if (status != ORB_OK || !c->is_crumpled) {
+    return status;
+  }
+  ORB_TRY(orb_map_register(c, 0)); /* what has been unfolded is doubted no longer */
+  ORB_TRY(start_coarser(c));
+  if (c->best_energy < before) {
+    return ORB_OK;
+  }
+  allow(c);
+  return orb_map_run_start(c, ORB_MAP_SPATIAL);
 }
 
 orb_status orb_map_target_walks(orb_map_run *c, orb_map_walked *out) {
@@ -136,7 +156,7 @@ static orb_status run_first(orb_map_run *c, int *walked) {
   }
   *walked = c->best_energy < given;
   if (!*walked && !(c->walks_first && c->beat.energy > 0)) {
-    ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
+    ORB_TRY(start_spatial(c));
   }
   orb_map_course *course = &c->course;
   course->is_walked = *walked;
@@ -185,7 +205,7 @@ static orb_status run_starts(orb_map_run *c) {
     ORB_TRY(run_passes(c));
     ORB_TRY(orb_map_register(c, 0));
   }
-  if (c->best_energy > p->energy.poor && !is_held(c)) {
+  if (c->best_energy > p->energy.poor && !is_held(c) && !c->has_started_coarser) {
     ORB_TRY(start_coarser(c));
   }
   return c->best_energy > p->energy.poor && !is_held(c) ? start_from_others(c) : ORB_OK;

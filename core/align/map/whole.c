@@ -93,6 +93,7 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                        .passes = params.work.passes,
                        .work = params.work.all * (int64_t)moving->mesh.vertex_count,
                        .hopeless = INFINITY,
+                       .crumpled = INFINITY,
                        .settled = INFINITY,
                        .twisted_energy = INFINITY};
 }
@@ -133,12 +134,12 @@ static int should_slide(const orb_map_run *c, orb_map_from from) {
 /* Draws the map to where parts of the shapes fit in space, or slides where that may help. before: the energy of the map
  * as given. */
 orb_status orb_map_run_fit(orb_map_run *c, orb_map_from from, double before) {
-  int is_part = 0;
+  orb_map_part part = ORB_MAP_NO_PART;
   if (c->may_fit_parts) {
-    ORB_TRY(orb_map_is_part(c, &is_part));
+    ORB_TRY(orb_map_find_part(c->ctx, &c->params, c->fixed, c->moving, c->landmark_count, &part));
   }
-  if (is_part) {
-    ORB_TRY(orb_map_fit_part(c));
+  if (part != ORB_MAP_NO_PART) {
+    ORB_TRY(orb_map_fit_part(c, part));
   }
   return !c->course.fits_part && should_slide(c, from) ? orb_map_slide(c, before) : ORB_OK;
 }

@@ -36,6 +36,8 @@ typedef struct orb_map_level_map {
  * (params.energy.bulk). */
 typedef struct orb_map_course {
   double first_bulk, bulk; /* after the first start, and at last */
+  double loose;            /* the energy before the map is fitted in space, which costs energy and brings it nearer to
+                              the truth; INFINITY: there is no map */
   int is_walked;           /* the first start is a landmark walk */
   int fits_part;           /* the map is drawn to where parts of the shapes fit (space/part.h): energies do not tell
                               how good it is */

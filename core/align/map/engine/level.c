@@ -252,7 +252,8 @@ static void gather(orb_map_level *l, const orb_corner_table *s, const unsigned c
 orb_status orb_map_level_create(orb_context *ctx, const orb_map_params *params, const orb_corner_table *s,
                                 const unsigned char *alive, const unsigned char *pinned, const double *position,
                                 int32_t live, int32_t *local, orb_map_level *out) {
-  orb_map_level l = {.params = params, .count = live, .triangle_count = 2 * live - 4, .local = local};
+  orb_map_level l = {
+      .params = params, .count = live, .triangle_count = 2 * live - 4, .to_mesh = s->to_mesh, .local = local};
   double *shape = NULL;
   orb_status status;
   ORB_GO(status, reserve(ctx, &l), done);

@@ -11,10 +11,12 @@
  *   vector/           the step for several vertices at once
  *   sweep.h           sweeps of such steps
  *   untangle.h        clearing flips on the sphere
+ *   folds.h           what untangling has only spread is taken back
  *   unfold.h          clearing the last ones for certain, and setting parts anew
  *   run.h             what one call of orb_compose() holds, and the points that the fixed shape has on the sphere
+ *   clear.h           rounds of sweeps, untangling and unfolding
  *   iron.h            crumpled parts that are set anew
- *   rounds.h, near.h  rounds of sweeps and untangling; levels that are nearly a map
+ *   rounds.h, near.h  rounds of sweeps; levels that are nearly a map
  *   spread.h          samples
  */
 #ifndef ORB_ALIGN_MAP_ENGINE_LEVEL_H
@@ -34,9 +36,10 @@ typedef struct orb_map_spoke {
 typedef struct orb_map_level {
   const orb_map_params *params; /* borrowed */
   int32_t count, triangle_count;
-  int32_t *vertex; /* numbers of the surface */
-  int32_t *local;  /* of each vertex of the surface: its number here, −1: none; borrowed */
-  int32_t *start;  /* of each vertex's spokes; count + 1 */
+  int32_t *vertex;        /* numbers of the surface */
+  const int32_t *to_mesh; /* of each vertex of the surface: its number in the mesh; borrowed */
+  int32_t *local;         /* of each vertex of the surface: its number here, −1: none; borrowed */
+  int32_t *start;         /* of each vertex's spokes; count + 1 */
   orb_map_spoke *spoke;
   int32_t *triangle;     /* 3 each, numbers of the level */
   orb_place *place;      /* on the fixed shape */

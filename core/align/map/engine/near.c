@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/clear.h"
 #include "align/map/engine/near.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/untangle.h"
@@ -106,7 +107,7 @@ orb_status orb_map_keep_usable(orb_map_run *c, const orb_map_level *l, const int
     if (!mark[i]) {
       c->usable[v] = 1;
       c->target_place[v] = l->place[i];
-      c->doubted[v] = 0;
+      c->doubted[v] = ORB_MAP_TRUSTED;
     }
   }
   c->has_usable = 1;

@@ -104,6 +104,10 @@ typedef struct orb_map_params {
                         the distances between their landmarks, so less than energy.good can be reached */
     double walked;   /* energy of all starts above which walks are tried. Maps of two people in other poses have
                         up to 1.5, and walks led to 0.1 to 0.5 more */
+    double folded; /* the first start begins on a coarser level if clearing flips raises the energy of its first one by
+                      more than this factor. With 1.25 to 1.32 three pairs of people came to 1.06 to 1.13 from it, two
+                      of them to 1.10 and 1.25 from a coarser one; with 1.38 to 1.54 two pairs came to 1.22 to 1.88, and
+                      to 1.14 to 1.23 from a coarser one */
     double crumpled; /* energy of the first start up to which it is drawn at once */
     double drawn;    /* energy above which the map is not drawn: it stays caught */
     double gain;     /* a draw that brings the energy below this share opens the way for one more pass, */
@@ -182,6 +186,8 @@ typedef struct orb_map_params {
     double barrier_growth; /* from round to round */
     double flip_growth;    /* the rounds end if there are more flips than after the first round, by this factor: if a
                               harder barrier makes more flips, large parts are folded */
+    double crumples;       /* rounds end with an unfolding that brings the energy to at most this many times what it was
+                              with flips */
     int loosen_rounds;     /* after loosening, where few flips are expected */
   } clear;
 
@@ -225,6 +231,9 @@ typedef struct orb_map_params {
                        vertex that has arrived is within 0.03 */
     double left;    /* share of the vertices that may stay behind: where a leg had slid far, ten times as many did */
     double arrived; /* of those left, another draw leaves at most this share, or it is the last */
+    int tries;      /* of a draw, as long as it brings the energy above `most`, */
+    double weaker;  /* each with this share of the last one's pull. A first guess: a horse that runs, drawn to a cow,
+                       came  1 % too high with all of it, and with 0.3 nearer to the truth by a quarter */
     double most;    /* energy afterwards, relative to before. With 1.03, maps of animals of two kinds stayed: their
                        relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
   } slide;

@@ -1,17 +1,15 @@
-/* Rounds of sweeps on one level: with flips and without, clearing flips, loosening, and drawing to spatial targets. */
+/* Rounds of sweeps on one level: with flips and without, loosening, and drawing to spatial targets. */
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/clear.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/sweep.h"
-#include "align/map/engine/unfold.h"
-#include "align/map/engine/untangle.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-/* Rules of sweeps that allow flips against a barrier of this strength. */
-static orb_map_rules soft_rules(const orb_map_params *params, double barrier) {
+orb_map_rules orb_map_soft(const orb_map_params *params, double barrier) {
   return (orb_map_rules){.soft = 1, .barrier = barrier, .epsilon = params->star.epsilon, .omega = 1};
 }
 
@@ -56,7 +54,7 @@ void orb_map_pull_drawn(const orb_map_run *c, orb_map_level *l, const int32_t *t
                         const unsigned char *drawn) {
   for (int32_t v = 0; v < l->count; v++) {
     const int32_t m = to_mesh[l->vertex[v]];
-    l->pull[v] = !drawn || drawn[m] ? strength * l->area[v] : 0;
+    l->pull[v] = (!drawn || drawn[m]) && c->doubted[m] != ORB_MAP_FOLDED ? strength * l->area[v] : 0;
     if (strength > 0) {
       memcpy(l->target + 3 * (size_t)v, c->target + 3 * (size_t)m, sizeof(double[3]));
     }
@@ -64,55 +62,6 @@ void orb_map_pull_drawn(const orb_map_run *c, orb_map_level *l, const int32_t *t
   if (c->springs.count > 0) {
     set_springs(c, l, to_mesh);
   }
-}
-
-/* Clears the flips of a level, by untangling and then by unfolding what is left. *flips: those that the attempt left;
- * if there are any, the level is as it was. Either step may draw a triangle over half of the sphere: then no flip
- * remains, but the level covers the sphere twice. If it covered the sphere once before, that step is undone. */
-static orb_status clear_now(orb_map_run *c, orb_map_level *l, double *copy, int32_t *flips) {
-  const orb_map_params *params = &c->params;
-  const size_t size = 3 * (size_t)l->count * sizeof *copy;
-  const int32_t before = *flips, degree = orb_map_level_degree(l);
-  memcpy(copy, l->x, size);
-  ORB_TRY(orb_map_level_untangle(c->ctx, l, flips, &c->work));
-  if (degree == 1 && orb_map_level_degree(l) != 1) {
-    memcpy(l->x, copy, size);
-    *flips = before;
-  }
-  if (*flips && *flips <= l->triangle_count / (c->given_target ? params->clear.hopeless : params->clear.unfold)) {
-    ORB_TRY(orb_map_level_unfold(c->ctx, l, flips));
-    *flips = degree == 1 && orb_map_level_degree(l) != 1 ? before : *flips;
-  }
-  if (*flips) {
-    memcpy(l->x, copy, size);
-    return ORB_OK;
-  }
-  return orb_map_level_locate_all(c->ctx, l, &c->b, 0);
-}
-
-orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier, int rounds, int32_t *flips) {
-  const orb_map_params *params = &c->params;
-  orb_map_rules rules = soft_rules(params, barrier);
-  double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
-  orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
-  int32_t at_first = *flips = orb_map_level_flips(l);
-  int most = rounds;
-  for (int round = 0; round < most && *flips && c->work > 0 && status == ORB_OK; round++) {
-    ORB_GO(status, orb_map_sweeps(c, l, rules, params->clear.sweeps), done);
-    rules.barrier *= params->clear.barrier_growth;
-    *flips = orb_map_level_flips(l);
-    at_first = round == 0 ? *flips : at_first;
-    if (round > 1 && *flips > params->clear.flip_growth * at_first) {
-      break; /* a stronger barrier makes more flips: large parts are folded */
-    }
-    if (*flips) {
-      ORB_GO(status, clear_now(c, l, copy, flips), done);
-      most = *flips && *flips <= params->untangle.few ? 2 * rounds : rounds; /* too near to give up */
-    }
-  }
-done:
-  orb_free(c->ctx, copy);
-  return status;
 }
 
 orb_status orb_map_copy_take(orb_map_run *c, const orb_map_level *l, orb_map_copy *s) {
@@ -164,7 +113,7 @@ orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, double barrier, int 
     return status; /* no work is left to clear the flips that it would make */
   }
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
-  ORB_GO(status, orb_map_sweeps(c, l, soft_rules(&c->params, barrier), soft_sweeps), done);
+  ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(&c->params, barrier), soft_sweeps), done);
   ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.loosen_rounds, &flips), done);
   if (!flips) {
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), hard_sweeps), done);
@@ -186,7 +135,7 @@ static orb_status draw_round(orb_map_run *c, orb_map_level *l, int *held) {
   int32_t flips;
   orb_status status;
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
-  ORB_GO(status, orb_map_sweeps(c, l, soft_rules(params, params->clear.first_barrier), params->draw.sweeps), done);
+  ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(params, params->clear.first_barrier), params->draw.sweeps), done);
   ORB_GO(status, orb_map_clear_flips(c, l, params->clear.first_barrier, params->draw.clearings, &flips), done);
   *held = flips == 0;
   if (flips) {

@@ -7,6 +7,8 @@
 /* Sweeps until hardly any vertex moves, `count` times at most. */
 ORB_MUST_CHECK orb_status orb_map_sweeps(orb_map_run *run, orb_map_level *level, orb_map_rules rules, int count);
 
+/* Rules of sweeps that allow flips against a barrier of this strength. */
+orb_map_rules orb_map_soft(const orb_map_params *params, double barrier);
 /* Rules of sweeps that allow no flip. */
 orb_map_rules orb_map_hard(const orb_map_params *params);
 
@@ -30,11 +32,6 @@ void orb_map_copy_restore(const orb_map_copy *copy, orb_map_level *level);
 void orb_map_copy_restore_vertex(const orb_map_copy *copy, orb_map_level *level, int32_t v);
 
 void orb_map_copy_free(orb_map_run *run, orb_map_copy *copy);
-
-/* Clears flips: sweeps against a barrier that grows from `barrier`, then untangling of a copy, until that succeeds.
- * *flips: those left. */
-ORB_MUST_CHECK orb_status orb_map_clear_flips(orb_map_run *run, orb_map_level *level, double barrier, int rounds,
-                                              int32_t *flips);
 
 /* Frees vertices that barriers have locked in: allows flips for a while, against a barrier of this strength, and clears
  * them. Keeps the result only if no flip is left and its energy is lower. */

@@ -32,6 +32,13 @@ typedef struct orb_map_candidate {
   double energy;
 } orb_map_candidate;
 
+/* Why a vertex should not be where its target is. The first level of a start smooths such vertices. */
+typedef enum orb_map_doubt {
+  ORB_MAP_TRUSTED,
+  ORB_MAP_FACES_AWAY, /* the fixed shape faces another way there */
+  ORB_MAP_FOLDED      /* it belongs to a fold that had to be unfolded; it no longer pulls */
+} orb_map_doubt;
+
 enum { ORB_MAP_PINNED = 1, ORB_MAP_FREE = 2 }; /* values of run->keep */
 
 typedef struct orb_map_run {
@@ -62,7 +69,7 @@ typedef struct orb_map_run {
   double *target;                 /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
-  unsigned char *doubted;  /* vertices whose target_place faces another way: the first level of a start smooths them */
+  unsigned char *doubted;  /* of each vertex, mesh order: an orb_map_doubt of its target */
   unsigned char *keep;     /* vertices that stay on every level: those of pairs, pinned, and those of springs, free */
   unsigned char *usable;   /* vertices whose target_place is from a start that was nearly a map, mesh order */
   int has_usable;
@@ -73,13 +80,16 @@ typedef struct orb_map_run {
   double *start;    /* points of a map in which all pairs meet, mesh order: as given, later as walked */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
-  int may_fit_parts;      /* see orb_map_guide */
-  double hopeless;        /* a start whose first map has more energy is given up */
-  int32_t hopeless_flips; /* a start with more than one flip in this many triangles is given up */
-  double twisted_energy;  /* of the last map that was to be untwisted */
-  int passes;             /* registrations through samples of the best map that are left */
-  double settled;         /* energy of the map that the last pass brought no further: another pass would not either */
-  int64_t work;           /* vertex steps left for clearing flips and for further starts */
+  int may_fit_parts; /* see orb_map_guide */
+  double hopeless;   /* a start whose first map has more energy is given up */
+  double crumpled;   /* a start whose energy rises by more than this factor while flips are cleared is given up, */
+  int is_crumpled;   /* and this is 1 */
+  int has_started_coarser; /* from the targets that are given */
+  int32_t hopeless_flips;  /* a start with more than one flip in this many triangles is given up */
+  double twisted_energy;   /* of the last map that was to be untwisted */
+  int passes;              /* registrations through samples of the best map that are left */
+  double settled;          /* energy of the map that the last pass brought no further: another pass would not either */
+  int64_t work;            /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
 
 /* Leaves the run at least `steps` steps a vertex, so that a step that was given up does not starve the next one. */

@@ -21,20 +21,22 @@ static double share_left(const orb_map_run *c, const orb_map_level *l, const int
   return all > 0 ? (double)left / all : 0;
 }
 
-static orb_status draw_once(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, const unsigned char *drawn) {
+static orb_status draw_once(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, const unsigned char *drawn,
+                            double pull) {
   const orb_map_params *p = &c->params;
   orb_map_allow(c, p->targets.work);
-  orb_map_pull_drawn(c, l, to_mesh, p->slide.pull, drawn);
+  orb_map_pull_drawn(c, l, to_mesh, pull, drawn);
   ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(p), p->slide.sweeps));
   return orb_map_loosen(c, l, p->clear.first_barrier, p->slide.loosen, p->slide.sweeps);
 }
 
 /* A limb that has to go far is still on its way after a round. */
-orb_status orb_map_draw_whole(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, const unsigned char *drawn) {
+orb_status orb_map_draw_whole(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, const unsigned char *drawn,
+                              double pull) {
   double before, left = 1;
   do {
     before = left;
-    ORB_TRY(draw_once(c, l, to_mesh, drawn));
+    ORB_TRY(draw_once(c, l, to_mesh, drawn, pull));
     left = share_left(c, l, to_mesh, drawn);
   } while (left > c->params.slide.left && left < c->params.slide.arrived * before);
   return ORB_OK;

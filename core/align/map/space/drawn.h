@@ -13,9 +13,10 @@
 #include "align/map/engine/run.h"
 
 /* Draws a level of all vertices to run->target, in rounds: as long as a round brings many of those left to theirs.
- * drawn: the vertices that are drawn, mesh order; NULL: all. to_mesh: of the surface's vertices. */
+ * drawn: the vertices that are drawn, mesh order; NULL: all. to_mesh: of the surface's vertices. pull: its strength,
+ * relative to the energy of a vertex's area. */
 ORB_MUST_CHECK orb_status orb_map_draw_whole(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh,
-                                             const unsigned char *drawn);
+                                             const unsigned char *drawn, double pull);
 
 /* Makes the level the best map, unless it has flips, covers the sphere more than once, or has an energy of `most` or
  * more. Returns whether it has. */

@@ -41,6 +41,7 @@ static orb_status slide_targets(orb_map_run *c, const orb_map_level *l, const in
     goto done;
   }
   ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &tree), done);
+  memset(c->doubted, 0, (size_t)c->vertex_count);
   for (int32_t v = 0; v < c->vertex_count; v++) {
     orb_place place;
     (void)orb_nearest_query(tree, position + 3 * (size_t)v, INFINITY, &place);
@@ -65,8 +66,13 @@ orb_status orb_map_slide(orb_map_run *c, double below) {
   if (!fits) {
     goto done;
   }
-  ORB_GO(status, orb_map_draw_whole(c, &level, s.to_mesh, NULL), done);
-  (void)orb_map_take_drawn(c, &level, s.to_mesh, fmin(below, c->params.slide.most * c->best_energy));
+  const double most = fmin(below, c->params.slide.most * c->best_energy);
+  double pull = c->params.slide.pull;
+  int is_taken = 0;
+  for (int i = 0; i < c->params.slide.tries && !is_taken; i++, pull *= c->params.slide.weaker) {
+    ORB_GO(status, orb_map_draw_whole(c, &level, s.to_mesh, NULL, pull), done);
+    is_taken = orb_map_take_drawn(c, &level, s.to_mesh, most);
+  }
 done:
   orb_map_level_free(ctx, &level);
   orb_corner_table_free(ctx, &s);

@@ -50,7 +50,7 @@ static void find_target_places(void *arg, int64_t begin, int64_t end, int thread
     (void)orb_nearest_query(job->tree, c->target + 3 * v, INFINITY, &c->target_place[v]);
     orb_map_surface_at(&c->b, &c->target_place[v], NULL, NULL, n);
     const int is_away = orb_dot(n, c->target_normal + 3 * v) < c->params.place.facing;
-    c->doubted[v] = (unsigned char)(is_away && c->keeps_angles);
+    c->doubted[v] = is_away && c->keeps_angles ? ORB_MAP_FACES_AWAY : ORB_MAP_TRUSTED;
     if (is_away && !c->keeps_angles) {
       c->target_place[v] = nearest_with_normal(c, (int32_t)v);
     }

@@ -1,0 +1,138 @@
+/* Untangling clears most flips, and hardly crumples. What it leaves is unfolded. How much that crumples is close to
+ * chance: the least flips may leave a map of 1.5 or of 5 times the energy. So it is tried in up to two ways a round,
+ * and in further rounds as long as all ways crumple; the best one is taken. */
+#include "align/map/engine/clear.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/map/engine/folds.h"
+#include "align/map/engine/rounds.h"
+#include "align/map/engine/unfold.h"
+#include "align/map/engine/untangle.h"
+#include "base/check.h"
+#include "base/memory.h"
+
+typedef struct clearing {
+  orb_map_run *c;
+  orb_map_level *l;
+  size_t size;       /* of the points of all vertices, 3 each */
+  double *before;    /* points before a round's untangling, */
+  double *from;      /* before an unfolding, */
+  double *best_from; /* before the best one, */
+  double *best_to;   /* and after it */
+  double energy;     /* then; INFINITY: none has cleared all flips */
+} clearing;
+
+static orb_status clearing_create(clearing *w) {
+  const size_t n = 3 * (size_t)w->l->count;
+  w->size = n * sizeof *w->before;
+  w->before = ORB_NEW(w->c->ctx, double, 4 * n);
+  if (!w->before) {
+    return ORB_E_NO_MEMORY;
+  }
+  w->from = w->before + n;
+  w->best_from = w->from + n;
+  w->best_to = w->best_from + n;
+  return ORB_OK;
+}
+
+/* Unfolds the level from where it is, and notes the way if it is the best one. Not if flips remain or the level then
+ * covers the sphere another number of times. */
+static orb_status try_unfolding(clearing *w, int degree, int32_t *flips) {
+  orb_map_level *l = w->l;
+  memcpy(w->from, l->x, w->size);
+  ORB_TRY(orb_map_level_unfold(w->c->ctx, l, flips));
+  if (*flips || (degree == 1 && orb_map_level_degree(l) != 1)) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_map_level_locate_all(w->c->ctx, l, &w->c->b, 0));
+  const double energy = orb_map_level_energy(l);
+  if (energy < w->energy) {
+    w->energy = energy;
+    memcpy(w->best_from, w->from, w->size);
+    memcpy(w->best_to, l->x, w->size);
+  }
+  return ORB_OK;
+}
+
+/* Unfolds a level that untangling has left with flips: from there, and from where folds are taken back, since
+ * untangling makes some folds easier to unfold and only spreads others. */
+static orb_status unfold(clearing *w, int degree, int32_t *flips) {
+  ORB_TRY(try_unfolding(w, degree, flips));
+  memcpy(w->l->x, w->from, w->size);
+  ORB_TRY(orb_map_level_restore_folds(w->c->ctx, w->l, w->before, flips));
+  return try_unfolding(w, degree, flips);
+}
+
+/* Untangles the level, and unfolds what is left. *flips: 0 if untangling has cleared all; else the level is as it was,
+ * and a way of unfolding may be noted. Either step may draw a triangle over half of the sphere: then no flip remains,
+ * but the level covers the sphere twice. If it covered the sphere once before, that step does not count. */
+static orb_status clear_once(clearing *w, int32_t *flips) {
+  orb_map_run *c = w->c;
+  orb_map_level *l = w->l;
+  const orb_map_params *params = &c->params;
+  const int32_t before = *flips, degree = orb_map_level_degree(l);
+  memcpy(w->before, l->x, w->size);
+  ORB_TRY(orb_map_level_untangle(c->ctx, l, flips, &c->work));
+  if (degree == 1 && orb_map_level_degree(l) != 1) {
+    memcpy(l->x, w->before, w->size);
+    *flips = before;
+  }
+  if (*flips == 0) {
+    return orb_map_level_locate_all(c->ctx, l, &c->b, 0);
+  }
+  const int32_t most = l->triangle_count / (c->given_target ? params->clear.hopeless : params->clear.unfold);
+  const int is_tried = *flips <= most;
+  if (is_tried) {
+    ORB_TRY(unfold(w, degree, flips));
+    *flips = *flips > 0 ? *flips : 1; /* the level itself is not cleared yet */
+  }
+  memcpy(l->x, w->before, w->size);
+  return is_tried ? orb_map_level_locate_all(c->ctx, l, &c->b, 0) : ORB_OK;
+}
+
+/* Takes the best way. Where it moves vertices, their targets are folded: they are doubted from now on, and no longer
+ * pull, which would fold the map again or crumple it. */
+static orb_status take_best(clearing *w, int32_t *flips) {
+  orb_map_level *l = w->l;
+  memcpy(l->x, w->best_to, w->size);
+  *flips = 0;
+  for (size_t v = 0; v < (size_t)l->count; v++) {
+    if (memcmp(w->best_from + 3 * v, w->best_to + 3 * v, sizeof(double[3])) != 0) {
+      w->c->doubted[l->to_mesh[l->vertex[v]]] = ORB_MAP_FOLDED;
+      l->pull[v] = 0;
+    }
+  }
+  return orb_map_level_locate_all(w->c->ctx, l, &w->c->b, 0);
+}
+
+orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier, int rounds, int32_t *flips) {
+  const orb_map_params *params = &c->params;
+  orb_map_rules rules = orb_map_soft(params, barrier);
+  clearing w = {.c = c, .l = l, .energy = INFINITY};
+  orb_status status = clearing_create(&w);
+  int32_t at_first = *flips = orb_map_level_flips(l);
+  int most = rounds;
+  double enough = 0;
+  for (int round = 0; round < most && *flips && w.energy > enough && c->work > 0 && status == ORB_OK; round++) {
+    ORB_GO(status, orb_map_sweeps(c, l, rules, params->clear.sweeps), done);
+    rules.barrier *= params->clear.barrier_growth;
+    *flips = orb_map_level_flips(l);
+    at_first = round == 0 ? *flips : at_first;
+    if (round > 1 && *flips > params->clear.flip_growth * at_first) {
+      break; /* a stronger barrier makes more flips: large parts are folded */
+    }
+    enough = params->clear.crumples * orb_map_level_energy(l);
+    if (*flips) {
+      ORB_GO(status, clear_once(&w, flips), done);
+      most = *flips && *flips <= params->untangle.few ? 2 * rounds : rounds; /* too near to give up */
+    }
+  }
+  if (*flips && w.energy < INFINITY) {
+    status = take_best(&w, flips);
+  }
+done:
+  orb_free(c->ctx, w.before);
+  return status;
+}
