@@ -39,7 +39,8 @@ from first_answer import ROOT, build_base
 from surface import Surface, cross, dot, minus
 
 RIGHT = 10
-FORMAT = 2  # the version of the files in the store: after a change everything is measured
+GIVEN_MOST = 24  # landmarks: however few are given, the same places are measured, those after this many
+FORMAT = 3  # the version of the files in the store: after a change everything is measured
 CURVE = (1, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50)
 PAIR_COLUMNS = ["set", "pair", "kind", "half", "version", "given", "mean", "median", "95 %", "right", "% diagonal",
                 "energy", "confidence", "thin %", "CPU s"]
@@ -90,7 +91,8 @@ def measure(program, pair, given, change, options):
     first, second, places = correspond_changes.change(change, first, second, pair.places(), options.store / "changed")
     if len(places) <= given:
         return None  # nothing is left to measure at
-    places = places[:given] + spread(places[given:], PLACES)
+    first_measured = GIVEN_MOST if len(places) > GIVEN_MOST else given
+    places = places[:given] + spread(places[max(given, first_measured):], PLACES)
     targets = [second.position(place[1]) for place in places]
     chosen = anchors(targets)
     at = [[{"triangle": p[0], "barycentric": list(p[1])} for p in place[:2]] for place in places]

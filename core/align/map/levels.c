@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "align/map/engine/iron.h"
+#include "align/map/engine/loosen.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/step.h"
 #include "align/map/starts/place.h"

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "align/map/engine/clear.h"
+#include "align/map/engine/loosen.h"
 #include "align/map/engine/near.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/levels.h"

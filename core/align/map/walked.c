@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/loosen.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/starts/landmark_walk.h"
 #include "base/check.h"

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/loosen.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/unfold.h"
 #include "align/map/engine/untangle.h"

@@ -14,9 +14,11 @@
  *   folds.h           what untangling has only spread is taken back
  *   unfold.h          clearing the last ones for certain, and setting parts anew
  *   run.h             what one call of orb_compose() holds, and the points that the fixed shape has on the sphere
+ *   rounds.h          sweeps with and without flips, and pulls
  *   clear.h           rounds of sweeps, untangling and unfolding
+ *   loosen.h          rounds with flips allowed that are then cleared
  *   iron.h            crumpled parts that are set anew
- *   rounds.h, near.h  rounds of sweeps; levels that are nearly a map
+ *   near.h            levels that are nearly a map
  *   spread.h          samples
  */
 #ifndef ORB_ALIGN_MAP_ENGINE_LEVEL_H

@@ -33,12 +33,4 @@ void orb_map_copy_restore_vertex(const orb_map_copy *copy, orb_map_level *level,
 
 void orb_map_copy_free(orb_map_run *run, orb_map_copy *copy);
 
-/* Frees vertices that barriers have locked in: allows flips for a while, against a barrier of this strength, and clears
- * them. Keeps the result only if no flip is left and its energy is lower. */
-ORB_MUST_CHECK orb_status orb_map_loosen(orb_map_run *run, orb_map_level *level, double barrier, int soft_sweeps,
-                                         int hard_sweeps);
-
-/* Draws a level without flips to its spatial targets, less strongly from round to round. */
-ORB_MUST_CHECK orb_status orb_map_draw(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh);
-
 #endif

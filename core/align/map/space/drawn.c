@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "align/map/engine/loosen.h"
 #include "align/map/engine/rounds.h"
 #include "base/check.h"
 #include "numeric/vec3.h"

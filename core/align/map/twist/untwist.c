@@ -14,6 +14,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/loosen.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/run.h"
 #include "align/map/engine/untangle.h"
