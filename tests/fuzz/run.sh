@@ -72,13 +72,19 @@ cpu_of() {
   echo $(((${12} + ${13}) / $(getconf CLK_TCK)))
 }
 
+# Whether a process waits for something other than a core.
+is_asleep() {
+  [[ $(cat "/proc/$1/stat" 2>/dev/null) =~ \)\ [SD]\  ]]
+}
+
 # Runs a target. When the time is up, SIGUSR1 makes the fuzzer end with its statistics. With --cpu no limit of the fuzzer
-# counts wall time, for it may wait for a core; an input that still runs after HANGS CPU seconds more is a finding: SIGABRT
-# makes the fuzzer keep it. The targets themselves abort at an input that costs too much CPU time (cost.h).
-HANGS=60
+# counts wall time, for it may wait for a core. Two kinds of inputs are findings then, and SIGABRT makes the fuzzer keep
+# them: one that still runs after HANGS CPU seconds more, once the corpus has been read, and one that sleeps for SLEEPS
+# seconds. The targets themselves abort at an input that costs too much CPU time (cost.h).
+HANGS=60 SLEEPS=1200
 one() {
   local name=$1 seconds=$2 unit=$3 log=build-fuzz/corpus/$1.log began=build-fuzz/corpus/$1.began status=0 used=0 limit=$2
-  local fuzzer now runs cov kept times slow=60 signal=USR1
+  local fuzzer now runs cov kept times slow=60 until='' asleep=0
   mkdir -p "build-fuzz/corpus/$name"
   touch "$began"
   [ "$unit" = wall ] || limit=0 slow=0
@@ -91,10 +97,14 @@ one() {
       trap 'kill $fuzzer 2>/dev/null' HUP INT TERM
       if [ "$unit" = cpu ]; then
         while now=$(cpu_of $fuzzer); do
+          asleep=$([ "$now" = "$used" ] && is_asleep $fuzzer && echo $((asleep + 1)) || echo 0)
           used=$now
           if [ "$now" -ge "$seconds" ]; then
-            kill -$signal $fuzzer 2>/dev/null || true
-            [ "$now" -lt $((seconds + HANGS)) ] || signal=ABRT
+            kill -USR1 $fuzzer 2>/dev/null || true
+            [ -n "$until" ] || ! grep -q INITED "$log" || until=$((now + HANGS))
+          fi
+          if [ "$now" -gt "${until:-$now}" ] || [ "$asleep" -gt "$SLEEPS" ]; then
+            kill -ABRT $fuzzer 2>/dev/null || true
           fi
           sleep 1
         done
@@ -178,6 +188,6 @@ if [ $unit = keep ]; then
   done
   exit
 fi
-export -f one cpu_of
-export is_stopped HANGS
+export -f one cpu_of is_asleep
+export is_stopped HANGS SLEEPS
 printf '%s\n' "${targets[@]}" | xargs -P $(($(nproc) + 1)) -I{} bash -c "one {} $amount $unit"

@@ -55,7 +55,7 @@ static int32_t list_landmarks(const orb_landmark *landmarks, const orb_alignment
 /* The result of a match before anything is pinned. */
 typedef struct posed {
   orb_alignment alignment; /* empty, unless it is found */
-  double worst;            /* the largest energy of its maps, before they are fitted in space */
+  double worst, loose;     /* the largest energy of its maps, and the mean, before they are fitted in space */
   int is_found;
   int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body */
 } posed;
@@ -165,7 +165,9 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
   }
   const double energy = improved ? energies[1] : INFINITY;
   a->energy += energy / (a->shape_count - 1);
-  p->worst = fmax(p->worst, fmin(energy, improved ? course.loose : INFINITY));
+  const double loose = improved ? fmin(energy, course.loose) : INFINITY;
+  p->loose += loose / (a->shape_count - 1);
+  p->worst = fmax(p->worst, loose);
 done:
   orb_match_free(ctx, &match);
   orb_free(ctx, vertex[0]);
@@ -224,10 +226,10 @@ static void keep_better(two_ways *c) {
   if (!p->is_found) {
     return;
   }
-  if (p->worst < c->loose) {
+  if (p->loose < c->loose) {
     orb_alignment_free(c->ctx, &c->pinned);
     c->pinned = p->alignment;
-    c->loose = p->worst;
+    c->loose = p->loose;
     memset(&p->alignment, 0, sizeof p->alignment);
   }
   posed_free(c->ctx, p);
@@ -256,8 +258,9 @@ static orb_status improve(two_ways *c) {
     keep_better(c);
   }
   if (preset == ORB_PRESET_QUALITY || !is_done) {
+    const double before = c->pinned.energy;
     ORB_TRY(orb_compose_all(c->ctx, &c->pinned, ORB_MAP_FROM_SPACE, NULL, preset));
-    c->loose = fmin(c->loose, c->pinned.energy);
+    c->loose = c->pinned.energy < before ? c->pinned.energy : c->loose;
   }
   keep_better(c);
   return ORB_OK;

@@ -19,7 +19,7 @@
  *   (engine/near.c).
  * - As given, or after a landmark walk of the landmarks, mirror landmarks and some samples of the spatial targets
  *   (starts/landmark_walk.c). It has no flips from the beginning.
- * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
+ * - From the best map so far, drawn to the spatial targets (engine/loosen.c).
  *
  * If spatial targets are given, other starts are used, and limbs are untwisted only at the end (targets.h). Then the
  * map slides to where the shapes fit each other in space (space/slide.h), or it is drawn to where a part does

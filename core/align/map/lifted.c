@@ -31,7 +31,8 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   ORB_ASSERT(level.count == copy->count);
   /* The copy's edges may have been split where landmarks pass one another. Without the splits, triangles can flip. */
   if (orb_map_level_flips(&level) > 0) {
-    ORB_GO(status, orb_map_clear_flips(c, &level, c->params.clear.first_barrier, c->params.clear.rounds, &flips), done);
+    ORB_GO(status, orb_map_clear_flips(c, &level, c->params.clear.first_barrier, c->params.clear.rounds, 0, &flips),
+           done);
   }
   if (flips > 0) {
     goto done;

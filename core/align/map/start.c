@@ -17,7 +17,7 @@ static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level
                               int32_t *flips) {
   ORB_TRY(orb_map_place(c, l, to_mesh, start));
   orb_map_set_pull(c, l, to_mesh, 1);
-  return orb_map_clear_flips(c, l, c->params.clear.first_barrier * c->params.clear.again, c->params.clear.rounds,
+  return orb_map_clear_flips(c, l, c->params.clear.first_barrier * c->params.clear.again, c->params.clear.rounds, 1,
                              flips);
 }
 
@@ -36,7 +36,7 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
       c->work -= c->params.work.given_up * (int64_t)c->vertex_count;
       return ORB_OK;
     }
-    ORB_TRY(orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.rounds, flips));
+    ORB_TRY(orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.rounds, 1, flips));
     if (*flips && start == ORB_MAP_SPATIAL && orb_map_is_near(l, *flips)) {
       ORB_TRY(clear_again(c, start, l, to_mesh, flips));
     }
@@ -51,6 +51,13 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
   return ORB_OK;
 }
 
+/* What another start has unfolded says nothing of this one. */
+static void trust_folds(orb_map_run *c) {
+  for (int32_t v = 0; v < c->vertex_count; v++) {
+    c->doubted[v] = c->doubted[v] == ORB_MAP_FOLDED ? ORB_MAP_TRUSTED : c->doubted[v];
+  }
+}
+
 orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
   orb_context *ctx = c->ctx;
   orb_refiner *r = NULL;
@@ -58,6 +65,9 @@ orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
   int32_t flips = 1, size = start == ORB_MAP_SPATIAL ? c->params.level.spatial : c->params.level.mapped;
   int given_up = 0, is_given = start == ORB_MAP_GIVEN;
   orb_status status;
+  if (start == ORB_MAP_SPATIAL) {
+    trust_folds(c);
+  }
   ORB_GO(status, orb_map_levels_begin(c, &r), done);
   while (flips) {
     ORB_GO(status, orb_map_level_place(c, r, start, size, &level), done);

@@ -97,12 +97,16 @@ static orb_status start_spatial(orb_map_run *c) {
   if (status != ORB_OK || !c->is_crumpled) {
     return status;
   }
-  ORB_TRY(orb_map_register(c, 0)); /* what has been unfolded is doubted no longer */
+  ORB_TRY(
+      orb_map_register(c, 0)); /* as given: from smooth targets, a horse and a dog came to 1.31, from these to 1.20 */
   ORB_TRY(start_coarser(c));
   if (c->best_energy < before) {
     return ORB_OK;
   }
   allow(c);
+  if (c->starts_smooth) {
+    ORB_TRY(smooth_targets(c));
+  }
   return orb_map_run_start(c, ORB_MAP_SPATIAL);
 }
 

@@ -39,11 +39,12 @@ static orb_status clearing_create(clearing *w) {
 
 /* Unfolds the level from where it is, and notes the way if it is the best one. Not if flips remain or the level then
  * covers the sphere another number of times. */
-static orb_status try_unfolding(clearing *w, int degree, int32_t *flips) {
+static orb_status try_unfolding(clearing *w, int degree) {
   orb_map_level *l = w->l;
+  int32_t flips;
   memcpy(w->from, l->x, w->size);
-  ORB_TRY(orb_map_level_unfold(w->c->ctx, l, flips));
-  if (*flips || (degree == 1 && orb_map_level_degree(l) != 1)) {
+  ORB_TRY(orb_map_level_unfold(w->c->ctx, l, &flips));
+  if (flips || (degree == 1 && orb_map_level_degree(l) != 1)) {
     return ORB_OK;
   }
   ORB_TRY(orb_map_level_locate_all(w->c->ctx, l, &w->c->b, 0));
@@ -57,22 +58,23 @@ static orb_status try_unfolding(clearing *w, int degree, int32_t *flips) {
 }
 
 /* Unfolds a level that untangling has left with flips: from there, and from where folds are taken back, since
- * untangling makes some folds easier to unfold and only spreads others. */
+ * untangling makes some folds easier to unfold and only spreads others. *flips: those after folds are taken back. */
 static orb_status unfold(clearing *w, int degree, int32_t *flips) {
-  ORB_TRY(try_unfolding(w, degree, flips));
+  ORB_TRY(try_unfolding(w, degree));
   memcpy(w->l->x, w->from, w->size);
   ORB_TRY(orb_map_level_restore_folds(w->c->ctx, w->l, w->before, flips));
-  return try_unfolding(w, degree, flips);
+  return try_unfolding(w, degree);
 }
 
-/* Untangles the level, and unfolds what is left. *flips: 0 if untangling has cleared all; else the level is as it was,
- * and a way of unfolding may be noted. Either step may draw a triangle over half of the sphere: then no flip remains,
- * but the level covers the sphere twice. If it covered the sphere once before, that step does not count. */
+/* Untangles the level, and unfolds what is left. *flips: those that untangling leaves; if there are any, the level is
+ * as it was, and a way of unfolding may be noted. Either step may draw a triangle over half of the sphere: then no flip
+ * remains, but the level covers the sphere twice. If it covered the sphere once before, that step does not count. */
 static orb_status clear_once(clearing *w, int32_t *flips) {
   orb_map_run *c = w->c;
   orb_map_level *l = w->l;
   const orb_map_params *params = &c->params;
   const int32_t before = *flips, degree = orb_map_level_degree(l);
+  int32_t restored = before;
   memcpy(w->before, l->x, w->size);
   ORB_TRY(orb_map_level_untangle(c->ctx, l, flips, &c->work));
   if (degree == 1 && orb_map_level_degree(l) != 1) {
@@ -82,32 +84,32 @@ static orb_status clear_once(clearing *w, int32_t *flips) {
   if (*flips == 0) {
     return orb_map_level_locate_all(c->ctx, l, &c->b, 0);
   }
-  const int32_t most = l->triangle_count / (c->given_target ? params->clear.hopeless : params->clear.unfold);
-  const int is_tried = *flips <= most;
-  if (is_tried) {
-    ORB_TRY(unfold(w, degree, flips));
-    *flips = *flips > 0 ? *flips : 1; /* the level itself is not cleared yet */
+  if (*flips > l->triangle_count / (c->given_target ? params->clear.hopeless : params->clear.unfold)) {
+    memcpy(l->x, w->before, w->size);
+    return ORB_OK;
   }
+  ORB_TRY(unfold(w, degree, &restored));
+  *flips = restored > 0 && restored < *flips ? restored : *flips;
   memcpy(l->x, w->before, w->size);
-  return is_tried ? orb_map_level_locate_all(c->ctx, l, &c->b, 0) : ORB_OK;
+  return orb_map_level_locate_all(c->ctx, l, &c->b, 0);
 }
 
-/* Takes the best way. Where it moves vertices, their targets are folded: they are doubted from now on, and no longer
- * pull, which would fold the map again or crumple it. */
-static orb_status take_best(clearing *w, int32_t *flips) {
+/* Takes the best way. doubts: where it moves vertices, their targets are folded, so they no longer pull, which would
+ * fold the map again or crumple it. */
+static orb_status take_best(const clearing *w, int doubts) {
+  orb_map_run *c = w->c;
   orb_map_level *l = w->l;
   memcpy(l->x, w->best_to, w->size);
-  *flips = 0;
-  for (size_t v = 0; v < (size_t)l->count; v++) {
+  for (size_t v = 0; v < (size_t)l->count && doubts; v++) {
     if (memcmp(w->best_from + 3 * v, w->best_to + 3 * v, sizeof(double[3])) != 0) {
-      w->c->doubted[l->to_mesh[l->vertex[v]]] = ORB_MAP_FOLDED;
-      l->pull[v] = 0;
+      c->doubted[l->to_mesh[l->vertex[v]]] = ORB_MAP_FOLDED;
     }
   }
-  return orb_map_level_locate_all(w->c->ctx, l, &w->c->b, 0);
+  return orb_map_level_locate_all(c->ctx, l, &c->b, 0);
 }
 
-orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier, int rounds, int32_t *flips) {
+orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier, int rounds, int doubts,
+                               int32_t *flips) {
   const orb_map_params *params = &c->params;
   orb_map_rules rules = orb_map_soft(params, barrier);
   clearing w = {.c = c, .l = l, .energy = INFINITY};
@@ -126,11 +128,13 @@ orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier,
     enough = params->clear.crumples * orb_map_level_energy(l);
     if (*flips) {
       ORB_GO(status, clear_once(&w, flips), done);
-      most = *flips && *flips <= params->untangle.few ? 2 * rounds : rounds; /* too near to give up */
+      const int is_near = *flips <= params->untangle.few && !(w.energy < INFINITY);
+      most = is_near ? 2 * rounds : rounds; /* too near to give up */
     }
   }
   if (*flips && w.energy < INFINITY) {
-    status = take_best(&w, flips);
+    *flips = 0;
+    status = take_best(&w, doubts);
   }
 done:
   orb_free(c->ctx, w.before);

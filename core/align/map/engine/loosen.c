@@ -26,7 +26,8 @@ orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, double barrier, int 
   }
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
   ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(&c->params, barrier), soft_sweeps), done);
-  ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.loosen_rounds, &flips), done);
+  ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.loosen_rounds, 0, &flips),
+         done);
   if (!flips) {
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), hard_sweeps), done);
   }
@@ -48,7 +49,7 @@ static orb_status draw_round(orb_map_run *c, orb_map_level *l, int *held) {
   orb_status status;
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
   ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(params, params->clear.first_barrier), params->draw.sweeps), done);
-  ORB_GO(status, orb_map_clear_flips(c, l, params->clear.first_barrier, params->draw.clearings, &flips), done);
+  ORB_GO(status, orb_map_clear_flips(c, l, params->clear.first_barrier, params->draw.clearings, 0, &flips), done);
   *held = flips == 0;
   if (flips) {
     orb_map_copy_restore(&before, l);

@@ -82,7 +82,7 @@ orb_status orb_map_release(orb_map_run *c, orb_map_level *l, const int32_t *to_m
       count++;
     }
   }
-  ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.near.clearings, flips), done);
+  ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.near.clearings, 0, flips), done);
   if (*flips == 0) {
     ORB_GO(status, draw_home(c, l, to_mesh, home, released, &count), done);
     *flips = count;

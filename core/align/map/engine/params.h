@@ -231,9 +231,9 @@ typedef struct orb_map_params {
                        vertex that has arrived is within 0.03 */
     double left;    /* share of the vertices that may stay behind: where a leg had slid far, ten times as many did */
     double arrived; /* of those left, another draw leaves at most this share, or it is the last */
-    int tries;      /* of a draw, as long as it brings the energy above `most`, */
+    int tries;      /* of a draw, as long as none is taken, */
     double weaker;  /* each with this share of the last one's pull. A first guess: a horse that runs, drawn to a cow,
-                       came  1 % too high with all of it, and with 0.3 nearer to the truth by a quarter */
+                       came 1 % too high with all of it, and with 0.3 nearer to the truth by a quarter */
     double most;    /* energy afterwards, relative to before. With 1.03, maps of animals of two kinds stayed: their
                        relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
   } slide;

@@ -8,12 +8,13 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "align/map/space/drawn.h"
 #include "align/map/starts/place.h"
 #include "align/map/starts/registration.h"
 #include "base/check.h"
-#include "base/context.h"
+#include "base/loops.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -21,6 +22,8 @@ enum {
   LEAST_LANDMARKS = 5,
   MOST_LANDMARKS = 256 /* those that come after do not count: room grows with their square, time with their cube */
 };
+
+enum { SLICE = 1024, GRAIN = 64 }; /* vertices between checks for cancellation, and of one task: each may search all */
 
 static int by_value(const void *a, const void *b) {
   const double x = *(const double *)a, y = *(const double *)b;
@@ -122,66 +125,91 @@ static orb_status register_fixed(orb_map_run *c, const orb_map_surface *whole, d
                                    &off);
 }
 
-/* Finds the place of a surface that is nearest to a point. Returns whether it fits: it is near, and faces alike. */
-static int find_fitting(const orb_map_run *c, const orb_map_surface *on, const orb_nearest *tree, const double point[3],
-                        const double normal[3], orb_place *place) {
-  double y[3], n[3];
-  (void)orb_nearest_query(tree, point, INFINITY, place);
-  orb_map_surface_at(on, place, y, NULL, n);
-  return sqrt(orb_distance2(y, point)) < c->params.part.off && orb_dot(n, normal) > c->params.part.facing;
+/* Vertices of one surface that are to fit on another one. */
+typedef struct fitting {
+  const orb_map_run *run;
+  const orb_map_surface *own, *other;
+  const orb_nearest *tree; /* of the other surface */
+  unsigned char *fits;     /* of each vertex: it is near to the other surface, and faces alike */
+  orb_place *place;        /* of each vertex, on the other surface */
+} fitting;
+
+static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const fitting *f = arg;
+  const double off = f->run->params.part.off, facing = f->run->params.part.facing;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    const double *x = f->own->x + 3 * v;
+    double y[3], n[3];
+    (void)orb_nearest_query(f->tree, x, INFINITY, &f->place[v]);
+    orb_map_surface_at(f->other, &f->place[v], y, NULL, n);
+    f->fits[v] = orb_distance2(y, x) < off * off && orb_dot(n, f->own->normal + 3 * v) > facing;
+  }
 }
 
-/* Marks the vertices that the registered fixed shape, `part`, covers, and makes its places there their targets. Returns
- * the share of its vertices that lie on the moving shape, `whole`. */
-static double mark_covered(orb_map_run *c, const orb_map_surface surface[2], orb_nearest *const tree[2],
-                           unsigned char *fits) {
-  const orb_map_surface *part = &surface[0], *whole = &surface[1];
-  orb_place place;
+/* Finds the places of one surface's vertices on another one. fits, place: of each vertex. */
+static orb_status find_fitting(orb_map_run *c, const orb_map_surface *own, const orb_map_surface *other,
+                               unsigned char *fits, orb_place *place) {
+  orb_nearest *tree;
+  ORB_TRY(orb_nearest_create(c->ctx, other->x, other->triangles, other->triangle_count, &tree));
+  fitting f = {c, own, other, tree, fits, place};
+  orb_status status = orb_sliced_by(c->ctx, own->vertex_count, SLICE, GRAIN, fit_range, &f);
+  orb_nearest_destroy(c->ctx, tree);
+  return status;
+}
+
+/* Marks the vertices of the moving shape, `whole`, that the registered fixed shape, `part`, covers, and makes its
+ * places there their targets. *share: of the part's vertices, those that lie on the whole. */
+static orb_status mark_covered(orb_map_run *c, const orb_map_surface *part, const orb_map_surface *whole,
+                               unsigned char *fits, double *share) {
+  const size_t n = (size_t)part->vertex_count, m = (size_t)whole->vertex_count;
+  unsigned char *lies = ORB_NEW(c->ctx, unsigned char, n);
+  orb_place *place = ORB_NEW(c->ctx, orb_place, n > m ? n : m);
+  orb_status status = lies && place ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t count = 0;
-  for (int32_t u = 0; u < part->vertex_count; u++) {
-    count += find_fitting(c, whole, tree[1], part->x + 3 * (size_t)u, part->normal + 3 * (size_t)u, &place);
+  if (status != ORB_OK) {
+    goto done;
   }
-  memset(c->doubted, 0, (size_t)c->vertex_count);
-  for (int32_t v = 0; v < whole->vertex_count; v++) {
-    fits[v] =
-        (unsigned char)find_fitting(c, part, tree[0], whole->x + 3 * (size_t)v, whole->normal + 3 * (size_t)v, &place);
-    orb_map_surface_at(&c->b, &place, c->target + 3 * (size_t)v, NULL, NULL);
+  ORB_GO(status, find_fitting(c, part, whole, lies, place), done);
+  for (size_t u = 0; u < n; u++) {
+    count += lies[u];
   }
-  return (double)count / part->vertex_count;
+  *share = (double)count / part->vertex_count;
+  ORB_GO(status, find_fitting(c, whole, part, fits, place), done);
+  memset(c->doubted, ORB_MAP_TRUSTED, m);
+  for (size_t v = 0; v < m; v++) {
+    orb_map_surface_at(&c->b, &place[v], c->target + 3 * v, NULL, NULL);
+  }
+done:
+  orb_free(c->ctx, lies);
+  orb_free(c->ctx, place);
+  return status;
 }
 
 /* Registers the fixed shape, marks the vertices that it covers, and sets their targets. *share: see mark_covered(). */
 static orb_status fit_fixed(orb_map_run *c, unsigned char *fits, double *share) {
   orb_context *ctx = c->ctx;
   const orb_mesh *mesh = &c->moving->mesh;
-  orb_map_surface surface[2] = {{.vertex_count = c->b.vertex_count,
-                                 .triangle_count = c->b.triangle_count,
-                                 .triangles = c->b.triangles,
-                                 .x = ORB_NEW(ctx, double, 3 * (size_t)c->b.vertex_count),
-                                 .normal = ORB_NEW(ctx, double, 3 * (size_t)c->b.vertex_count)},
-                                {.vertex_count = mesh->vertex_count,
+  const orb_map_surface whole = {.vertex_count = mesh->vertex_count,
                                  .triangle_count = mesh->triangle_count,
                                  .triangles = mesh->triangles,
                                  .x = c->x,
-                                 .normal = c->normal}};
-  orb_nearest *tree[2] = {NULL, NULL};
-  orb_status status = surface[0].x && surface[0].normal ? ORB_OK : ORB_E_NO_MEMORY;
+                                 .normal = c->normal};
+  orb_map_surface part = {.vertex_count = c->b.vertex_count,
+                          .triangle_count = c->b.triangle_count,
+                          .triangles = c->b.triangles,
+                          .x = ORB_NEW(ctx, double, 3 * (size_t)c->b.vertex_count),
+                          .normal = ORB_NEW(ctx, double, 3 * (size_t)c->b.vertex_count)};
+  orb_status status = part.x && part.normal ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     goto done;
   }
-  ORB_GO(status, register_fixed(c, &surface[1], surface[0].x), done);
-  orb_map_normals(surface[0].x, c->b.vertex_count, c->b.triangles, c->b.triangle_count, surface[0].normal);
-  for (int i = 0; i < 2; i++) {
-    ORB_GO(status, orb_nearest_create(ctx, surface[i].x, surface[i].triangles, surface[i].triangle_count, &tree[i]),
-           done);
-  }
-  ORB_GO(status, orb_context_check(ctx), done);
-  *share = mark_covered(c, surface, tree, fits);
+  ORB_GO(status, register_fixed(c, &whole, part.x), done);
+  orb_map_normals(part.x, part.vertex_count, part.triangles, part.triangle_count, part.normal);
+  status = mark_covered(c, &part, &whole, fits, share);
 done:
-  orb_nearest_destroy(ctx, tree[0]);
-  orb_nearest_destroy(ctx, tree[1]);
-  orb_free(ctx, surface[0].x);
-  orb_free(ctx, surface[0].normal);
+  orb_free(ctx, part.x);
+  orb_free(ctx, part.normal);
   return status;
 }
 

@@ -41,7 +41,7 @@ static orb_status slide_targets(orb_map_run *c, const orb_map_level *l, const in
     goto done;
   }
   ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &tree), done);
-  memset(c->doubted, 0, (size_t)c->vertex_count);
+  memset(c->doubted, ORB_MAP_TRUSTED, (size_t)c->vertex_count);
   for (int32_t v = 0; v < c->vertex_count; v++) {
     orb_place place;
     (void)orb_nearest_query(tree, position + 3 * (size_t)v, INFINITY, &place);
