@@ -238,6 +238,47 @@ static void head_goes_to_the_head(void **state) {
   }
 }
 
+/* The vertex of a shape that is nearest to where a direction leaves the ball of the head. */
+static int32_t vertex_towards(const orb_mesh *mesh, const double to[3]) {
+  const double out = feature(to), at[3] = {out * to[0], out * to[1], out * to[2]};
+  int32_t best = 0;
+  for (int32_t v = 1; v < mesh->vertex_count; v++) {
+    best = distance(mesh->positions + 3 * (size_t)v, at) < distance(mesh->positions + 3 * (size_t)best, at) ? v : best;
+  }
+  return best;
+}
+
+/* With landmarks on the nose, the ears, the bun, the top and the neck, the head lies on the head of the bust, whichever
+ * comes first: it moves in both orders. A third of its radius is allowed, two edges. */
+static void landmarks_lay_the_head_onto_the_bust(void **state) {
+  (void)state;
+  enum { LANDMARKS = 8 };
+  static const double to[LANDMARKS][3] = {{1, 0, 0}, {0, 0.98, 0.2}, {0, -0.98, 0.2},    {-0.8, 0, 0.6},
+                                          {0, 0, 1}, {0.6, 0, -0.8}, {-0.6, 0.5, -0.62}, {-0.6, -0.5, -0.62}};
+  for (int head = 0; head < 2; head++) {
+    scene s = {.mesh = {shape_of(head, 4, 1), shape_of(!head, 4, 1)}};
+    orb_mesh ball = shape_ball(ctx, 4);
+    const orb_align_shape shape[2] = {{&s.mesh[0], ball.positions}, {&s.mesh[1], ball.positions}};
+    orb_place at[LANDMARKS][2];
+    orb_landmark landmark[LANDMARKS];
+    orb_align_options options;
+    orb_alignment out;
+    for (int i = 0; i < LANDMARKS; i++) {
+      landmark[i] = (orb_landmark){.at = at[i]};
+      for (int k = 0; k < 2; k++) {
+        assert_int_equal(orb_place_of_vertex(ctx, &s.mesh[k], vertex_towards(&s.mesh[k], to[i]), &at[i][k]), ORB_OK);
+      }
+    }
+    orb_align_defaults(&options);
+    assert_int_equal(orb_align(ctx, shape, 2, landmark, LANDMARKS, &options, &out), ORB_OK);
+    assert_true(out.shapes[0].certificate.valid && out.shapes[1].certificate.valid);
+    assert_true(off_the_head(&s, head, 4, &out) < 0.3);
+    orb_alignment_free(ctx, &out);
+    shape_free(ctx, &ball);
+    scene_close(&s);
+  }
+}
+
 static void threads_change_nothing(void **state) {
   (void)state;
   const orb_context_options options = {.threads = 3};
@@ -306,12 +347,10 @@ static void memory_runs_out(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(head_is_found_on_the_bust),
-                                     cmocka_unit_test(head_is_found_on_a_turned_bust),
-                                     cmocka_unit_test(other_shapes_are_no_parts),
-                                     cmocka_unit_test(body_without_its_limbs_is_no_part),
-                                     cmocka_unit_test(head_goes_to_the_head),
-                                     cmocka_unit_test(threads_change_nothing),
-                                     cmocka_unit_test(memory_runs_out)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(head_is_found_on_the_bust), cmocka_unit_test(head_is_found_on_a_turned_bust),
+      cmocka_unit_test(other_shapes_are_no_parts), cmocka_unit_test(body_without_its_limbs_is_no_part),
+      cmocka_unit_test(head_goes_to_the_head),     cmocka_unit_test(landmarks_lay_the_head_onto_the_bust),
+      cmocka_unit_test(threads_change_nothing),    cmocka_unit_test(memory_runs_out)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }
