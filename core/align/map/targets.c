@@ -88,7 +88,8 @@ static orb_status start_coarser(orb_map_run *c) {
   return status;
 }
 
-/* The first start from targets. If its folds leave it crumpled, a coarser one comes first. */
+/* The first start from targets. If its folds leave it crumpled, a coarser one comes first, from the targets as given:
+ * from smooth ones, a horse and a dog came to 1.31, from these to 1.20. */
 static orb_status start_spatial(orb_map_run *c) {
   const double before = c->best_energy;
   c->crumpled = c->params.targets.folded;
@@ -97,8 +98,7 @@ static orb_status start_spatial(orb_map_run *c) {
   if (status != ORB_OK || !c->is_crumpled) {
     return status;
   }
-  ORB_TRY(
-      orb_map_register(c, 0)); /* as given: from smooth targets, a horse and a dog came to 1.31, from these to 1.20 */
+  ORB_TRY(orb_map_register(c, 0));
   ORB_TRY(start_coarser(c));
   if (c->best_energy < before) {
     return ORB_OK;

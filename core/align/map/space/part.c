@@ -82,13 +82,26 @@ orb_status orb_map_find_part(orb_context *ctx, const orb_map_params *params, con
   return ORB_OK;
 }
 
+/* Landmarks that hold a registration. */
+static int32_t anchor_count(const orb_map_run *c) {
+  return c->pairs.landmarks < MOST_LANDMARKS ? c->pairs.landmarks : MOST_LANDMARKS;
+}
+
+/* Does a point fit at a place of a surface: is it near, and does the surface face like it? y: where the place is. */
+static int fits_at(const orb_map_run *c, const orb_map_surface *on, const orb_place *place, const double point[3],
+                   const double normal[3], double y[3]) {
+  double n[3];
+  orb_map_surface_at(on, place, y, NULL, n);
+  return sqrt(orb_distance2(y, point)) < c->params.part.off && orb_dot(n, normal) > c->params.part.facing;
+}
+
 /* Registers the moving shape in space by the landmarks alone. */
 static orb_status register_moving(orb_map_run *c) {
   const double *given = c->given_target;
   const int32_t samples = c->samples.count, pairs = c->pairs.count;
   c->given_target = NULL;
   c->samples.count = 0;
-  c->pairs.count = c->pairs.landmarks < MOST_LANDMARKS ? c->pairs.landmarks : MOST_LANDMARKS;
+  c->pairs.count = anchor_count(c);
   orb_status status = orb_map_register(c, 0);
   c->given_target = given;
   c->samples.count = samples;
@@ -101,21 +114,17 @@ static orb_status register_moving(orb_map_run *c) {
 static double mark_moving(orb_map_run *c, unsigned char *fits) {
   int32_t count = 0;
   for (int32_t v = 0; v < c->vertex_count; v++) {
-    double place[3], normal[3], *target = c->target + 3 * (size_t)v;
-    orb_map_surface_at(&c->b, &c->target_place[v], place, NULL, normal);
-    const double off = sqrt(orb_distance2(place, target));
-    fits[v] = off < c->params.part.off && orb_dot(normal, c->target_normal + 3 * (size_t)v) > c->params.part.facing;
+    double y[3], *target = c->target + 3 * (size_t)v;
+    fits[v] = (unsigned char)fits_at(c, &c->b, &c->target_place[v], target, c->target_normal + 3 * (size_t)v, y);
     count += fits[v];
-    for (int k = 0; k < 3; k++) {
-      target[k] = place[k];
-    }
+    memcpy(target, y, sizeof y);
   }
   return (double)count / c->vertex_count;
 }
 
 /* Registers the fixed shape to the moving one by the landmarks. lies: where its vertices come to lie, 3 each. */
 static orb_status register_fixed(orb_map_run *c, const orb_map_surface *whole, double *lies) {
-  const int32_t count = c->pairs.landmarks < MOST_LANDMARKS ? c->pairs.landmarks : MOST_LANDMARKS;
+  const int32_t count = anchor_count(c);
   double off, at[3 * MOST_LANDMARKS];
   for (int32_t i = 0; i < count; i++) {
     memcpy(at + 3 * (size_t)i, c->x + 3 * (size_t)c->pairs.moving[i], sizeof(double[3]));
@@ -136,14 +145,12 @@ typedef struct fitting {
 
 static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
   const fitting *f = arg;
-  const double off = f->run->params.part.off, facing = f->run->params.part.facing;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
     const double *x = f->own->x + 3 * v;
-    double y[3], n[3];
+    double y[3];
     (void)orb_nearest_query(f->tree, x, INFINITY, &f->place[v]);
-    orb_map_surface_at(f->other, &f->place[v], y, NULL, n);
-    f->fits[v] = orb_distance2(y, x) < off * off && orb_dot(n, f->own->normal + 3 * v) > facing;
+    f->fits[v] = (unsigned char)fits_at(f->run, f->other, &f->place[v], x, f->own->normal + 3 * v, y);
   }
 }
 
