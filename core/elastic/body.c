@@ -45,8 +45,8 @@ static double half_cotangent(const orb_mesh *mesh, size_t h) {
   return fmin(MOST_WEIGHT, fmax(LEAST_WEIGHT, value));
 }
 
-/* Lists the edges at each vertex. filled: room for a number per vertex, zeroed. */
-static void list_edges(orb_body *b, int32_t *filled) {
+/* Lists the half-edges at each vertex, that is each edge twice. filled: room for a number per vertex, zeroed. */
+static void list_half_edges(orb_body *b, int32_t *filled) {
   const orb_mesh *mesh = b->mesh;
   size_t h = 3 * (size_t)mesh->triangle_count;
   for (size_t i = 0; i < h; i++) {
@@ -66,6 +66,27 @@ static void list_edges(orb_body *b, int32_t *filled) {
   }
 }
 
+/* Merges the two half-edges of each edge, in the order of the first ones. at: room for a number per vertex. */
+static void merge_edges(orb_body *b, int32_t *at) {
+  int32_t count = 0, begin = 0;
+  memset(at, -1, (size_t)b->count * sizeof *at);
+  for (int32_t v = 0; v < b->count; v++) {
+    const int32_t first = count, end = b->start[v + 1];
+    for (int32_t i = begin; i < end; i++) {
+      const int32_t u = b->next[i];
+      if (at[u] >= first) {
+        b->weight[at[u]] += b->weight[i];
+      } else {
+        at[u] = count;
+        b->next[count] = u;
+        b->weight[count++] = b->weight[i];
+      }
+    }
+    begin = end;
+    b->start[v + 1] = count;
+  }
+}
+
 orb_status orb_body_create(orb_context *ctx, const orb_mesh *mesh, orb_body *out) {
   size_t n = (size_t)mesh->vertex_count, h = 3 * (size_t)mesh->triangle_count;
   out->mesh = mesh;
@@ -82,7 +103,8 @@ orb_status orb_body_create(orb_context *ctx, const orb_mesh *mesh, orb_body *out
   }
   if (status == ORB_OK) {
     orb_body_normals(mesh, mesh->positions, out->normal, out->mass);
-    list_edges(out, filled);
+    list_half_edges(out, filled);
+    merge_edges(out, filled);
     status = orb_searched_create(ctx, mesh->positions, out->normal, out->count, &out->searched);
   }
   if (status == ORB_OK) {

@@ -10,9 +10,8 @@ typedef struct orb_body {
   double *normal;       /* unit, weighted by area; 3 per vertex */
   double *mass;         /* a third of the area of the triangles around each vertex */
   orb_searched searched;
-  /* The edges of vertex v are start[v] … start[v + 1] − 1, each twice: once for each triangle beside it. */
-  int32_t *start, *next;
-  double *weight; /* half a cotangent, clamped so that all weights are positive */
+  int32_t *start, *next; /* the edges of vertex v are start[v] … start[v + 1] − 1 */
+  double *weight;        /* half the cotangents of both triangles, each clamped so that all weights are positive */
 } orb_body;
 
 /* Free `out` in any case; the mesh must outlive it. O(n). */

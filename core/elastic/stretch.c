@@ -58,7 +58,7 @@ static void gather_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* One round: the mean of a vertex and its neighbours, by their areas. */
+/* One round: the mean of a vertex and its neighbours, by their areas, with a neighbour counted twice. */
 static void smooth_range(void *arg, int64_t begin, int64_t end, int thread) {
   const fitting *f = arg;
   const orb_body *body = f->body;
@@ -70,7 +70,7 @@ static void smooth_range(void *arg, int64_t begin, int64_t end, int thread) {
       sum[k] = all * m[9 * v + k];
     }
     for (int32_t i = body->start[v]; i < body->start[v + 1]; i++) {
-      const double mass = body->mass[body->next[i]];
+      const double mass = 2 * body->mass[body->next[i]];
       all += mass;
       for (int k = 0; k < 9; k++) {
         sum[k] += mass * m[9 * (int64_t)body->next[i] + k];

@@ -268,7 +268,8 @@ static orb_status improve(two_ways *c) {
 
 /* Whether a match makes pins needless. With more than two shapes, no walk competes with it. */
 static int is_enough(const two_ways *c) {
-  const double most = c->shape_count > 2 ? ORB_FIND_POSED_POOR : orb_map_params_of(c->options->preset).energy.good;
+  const double most =
+      c->shape_count > 2 ? ORB_FIND_POSED_POOR : orb_map_params_of(c->options->preset).targets.contested;
   return c->posed.is_found && c->options->preset != ORB_PRESET_QUALITY && c->posed.worst <= most;
 }
 

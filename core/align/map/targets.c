@@ -5,8 +5,9 @@
  * It is ironed (engine/iron.h) and drawn to the targets at once, which smooths most crumples. If that leads to no map
  * of shapes that correspond, passes through samples of the best map follow. Then come two more starts, until one is
  * such a map: from the targets as given on a coarser level, and on the usual level from the targets that the first
- * start has not followed. Then passes and a draw bring the energy down. Passes come first: they find a better basin,
- * and a draw only the bottom of one. If no pass helps, the map is drawn to the given targets.
+ * start has not followed. Then passes, if the map is poor, and a draw bring the energy down. Passes come first: they
+ * find a better basin, and a draw only the bottom of one. If no pass helps, the map is drawn to the given targets,
+ * unless the last draw has brought little.
  *
  * If none of these gives such a map, samples of the targets guide landmark walks (walked.h). A walk begins without
  * flips and is optimised on a coarse level, so several are tried, and the best one is refined. Such shapes are of other
@@ -140,8 +141,11 @@ done:
 }
 
 static orb_status draw(orb_map_run *c) {
+  const double before = c->best_energy;
   allow(c);
-  return orb_map_run_start(c, ORB_MAP_DRAWN);
+  ORB_TRY(orb_map_run_start(c, ORB_MAP_DRAWN));
+  c->drawn = c->best_energy / before;
+  return ORB_OK;
 }
 
 static orb_status run_passes(orb_map_run *c) {
@@ -186,10 +190,10 @@ static orb_status ask_rival(orb_map_run *c) {
 }
 
 /* Continues from the first start, until there is a map of shapes that correspond, or the rival has a better one. A poor
- * first map is mostly beaten, so the rival is asked before it is drawn. */
+ * first map is often beaten, so the rival is asked before it is drawn. */
 static orb_status run_starts(orb_map_run *c) {
   const orb_map_params *p = &c->params;
-  const int asks_first = c->rival.ask && c->best_energy > p->energy.poor;
+  const int asks_first = c->rival.ask && c->best_energy > p->targets.asked_first;
   if (asks_first) {
     ORB_TRY(ask_rival(c));
     if (c->course.is_beaten) {
@@ -199,7 +203,7 @@ static orb_status run_starts(orb_map_run *c) {
   if (c->best_energy > smooth_energy(c) && c->best_energy <= p->targets.crumpled) {
     ORB_TRY(draw(c));
   }
-  if (c->rival.ask && !asks_first && c->best_energy > p->energy.good) {
+  if (c->rival.ask && !asks_first && c->best_energy > p->targets.contested) {
     ORB_TRY(ask_rival(c));
     if (c->course.is_beaten) {
       return ORB_OK;
@@ -224,27 +228,25 @@ static orb_status walk_towards(orb_map_run *c, int *walked) {
   return ORB_OK;
 }
 
-/* Continues from the map of all starts: passes, which find a better basin, then a draw to its bottom. */
+/* Continues from the map of all starts: passes, which may find a better basin than a poor map has, then a draw to the
+ * bottom of the basin. Of 34 maps that were not poor, no pass brought one lower by more than 0.3 %. */
 static orb_status improve_started(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   const double started = c->best_energy;
   if (started <= smooth_energy(c) || started > p->targets.hopeless) {
     return ORB_OK;
   }
-  ORB_TRY(run_passes(c));
-  if (c->best_energy <= smooth_energy(c) || c->best_energy > p->targets.drawn) {
+  if (started > p->energy.poor) {
+    ORB_TRY(run_passes(c));
+  }
+  const int is_drawn = !(c->best_energy < started) && c->drawn > p->targets.gain;
+  if (c->best_energy <= smooth_energy(c) || c->best_energy > p->targets.drawn || is_drawn) {
     return ORB_OK;
   }
   if (!(c->best_energy < started)) {
     ORB_TRY(orb_map_register(c, 0));
   }
-  const double before = c->best_energy;
-  ORB_TRY(draw(c));
-  if (c->best_energy < p->targets.gain * before && c->best_energy > p->targets.enough) {
-    c->passes = 1;
-    ORB_TRY(run_passes(c));
-  }
-  return ORB_OK;
+  return draw(c);
 }
 
 orb_status orb_map_follow_targets(orb_map_run *c) {

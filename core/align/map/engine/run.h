@@ -85,6 +85,7 @@ typedef struct orb_map_run {
   double crumpled;   /* a start whose energy rises by more than this factor while flips are cleared is given up, */
   int is_crumpled;   /* and this is 1 */
   int has_started_coarser; /* from the targets that are given */
+  double drawn;            /* share of the energy that the last draw has left; 0: nothing was drawn */
   int32_t hopeless_flips;  /* a start with more than one flip in this many triangles is given up */
   double twisted_energy;   /* of the last map that was to be untwisted */
   int passes;              /* registrations through samples of the best map that are left */
