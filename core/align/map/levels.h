@@ -34,8 +34,9 @@ ORB_MUST_CHECK orb_status orb_map_level_next(orb_map_run *run, orb_refiner *refi
 ORB_MUST_CHECK orb_status orb_map_levels_refine(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
                                                 double pull, double hold, int rough, int *failed);
 
-/* Stores a level without flips, refines it, and keeps the result as run->best if it is better. */
+/* Stores a level without flips, refines it, and keeps the result as run->best if it is better. pull, hold, rough: see
+ * orb_map_levels_refine(). */
 ORB_MUST_CHECK orb_status orb_map_levels_finish(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
-                                                double pull, int rough);
+                                                double pull, double hold, int rough);
 
 #endif

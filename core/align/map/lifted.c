@@ -18,6 +18,16 @@ static void set_start(orb_map_run *c, const orb_map_level_map *copy) {
   }
 }
 
+/* The vertices of the copy should stay where they are. */
+static void set_targets(orb_map_run *c, const orb_map_level *l) {
+  memset(c->doubted, ORB_MAP_NO_TARGET, (size_t)c->vertex_count);
+  for (int32_t v = 0; v < l->count; v++) {
+    const int32_t m = c->hierarchy->surface.to_mesh[l->vertex[v]];
+    memcpy(c->target + 3 * (size_t)m, l->y + 3 * (size_t)v, sizeof(double[3]));
+    c->doubted[m] = ORB_MAP_TRUSTED;
+  }
+}
+
 orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   orb_refiner *r = NULL;
   orb_map_level level = {0};
@@ -37,7 +47,8 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   if (flips > 0) {
     goto done;
   }
-  status = orb_map_levels_finish(c, r, &level, 0, c->vertex_count > c->params.copies.rough);
+  set_targets(c, &level);
+  status = orb_map_levels_finish(c, r, &level, 0, c->params.copies.hold, c->vertex_count > c->params.copies.rough);
 done:
   orb_map_level_free(c->ctx, &level);
   orb_refiner_destroy(c->ctx, r);

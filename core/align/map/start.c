@@ -83,7 +83,8 @@ orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
   if (start == ORB_MAP_DRAWN) {
     ORB_GO(status, orb_map_draw(c, &level, c->hierarchy->surface.to_mesh), done);
   }
-  status = orb_map_levels_finish(c, r, &level, is_given ? 0 : c->params.level.pull, is_given && c->params.work.rough);
+  status =
+      orb_map_levels_finish(c, r, &level, is_given ? 0 : c->params.level.pull, 0, is_given && c->params.work.rough);
 done:
   orb_map_level_free(ctx, &level);
   orb_refiner_destroy(ctx, r);

@@ -33,7 +33,7 @@ static const orb_map_params DEFAULTS = {
               .rigid = 1.1,
               .pull = 0.5,
               .pull_fall = 0.5},
-    .copies = {.size = 6000, .large = 9000, .rough = 60000},
+    .copies = {.size = 6000, .large = 9000, .rough = 60000, .hold = 1000},
     .targets = {.work = 500,
                 .hopeless = 3,
                 .alike = 1.05,

@@ -53,7 +53,7 @@ void orb_map_pull_drawn(const orb_map_run *c, orb_map_level *l, const int32_t *t
                         const unsigned char *drawn) {
   for (int32_t v = 0; v < l->count; v++) {
     const int32_t m = to_mesh[l->vertex[v]];
-    l->pull[v] = (!drawn || drawn[m]) && c->doubted[m] != ORB_MAP_FOLDED ? strength * l->area[v] : 0;
+    l->pull[v] = (!drawn || drawn[m]) && c->doubted[m] < ORB_MAP_FOLDED ? strength * l->area[v] : 0;
     if (strength > 0) {
       memcpy(l->target + 3 * (size_t)v, c->target + 3 * (size_t)m, sizeof(double[3]));
     }

@@ -36,7 +36,8 @@ typedef struct orb_map_candidate {
 typedef enum orb_map_doubt {
   ORB_MAP_TRUSTED,
   ORB_MAP_FACES_AWAY, /* the fixed shape faces another way there */
-  ORB_MAP_FOLDED      /* it belongs to a fold that had to be unfolded; it no longer pulls */
+  ORB_MAP_FOLDED,     /* it belongs to a fold that had to be unfolded; it no longer pulls */
+  ORB_MAP_NO_TARGET   /* it has none */
 } orb_map_doubt;
 
 enum { ORB_MAP_PINNED = 1, ORB_MAP_FREE = 2 }; /* values of run->keep */
