@@ -170,7 +170,7 @@ orb_status orb_map_levels_finish(orb_map_run *c, orb_refiner *r, orb_map_level *
   int failed = 0;
   orb_map_level_store(c, l, r);
   ORB_TRY(orb_map_levels_refine(c, r, l, pull, hold, rough, &failed));
-  if (!failed && c->given_target) { /* other starts compete with walks, which have no crumples */
+  if (!failed && (c->given_target || hold > 0)) { /* other starts compete with walks, which have no crumples */
     ORB_TRY(orb_map_iron(c, l));
     orb_map_level_store(c, l, r);
   }
