@@ -8,7 +8,10 @@
 
 #include <cmocka.h>
 
+#include "align/map/compose.h"
 #include "align/map/engine/params.h"
+#include "align/sheet/copies.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
 #include "support_align.h"
@@ -214,6 +217,57 @@ static void whole_shapes_have_the_places(void **state) {
   close_scene(&s);
 }
 
+/* Turns a point of the sphere about z, most at the equator: a map that is moved so has more energy than the identity.
+ */
+static void twist(const double p[3], double out[3]) {
+  const double angle = 0.2 * (1 - p[2] * p[2]);
+  out[0] = cos(angle) * p[0] - sin(angle) * p[1];
+  out[1] = sin(angle) * p[0] + cos(angle) * p[1];
+  out[2] = p[2];
+}
+
+/* What a copy's map has, because shapes fit in space or landmarks lie there, the whole shape keeps, though the identity
+ * has less energy. Fixed and moving shape are the same, so a vertex that is not moved has the same point on both. */
+static void a_lift_keeps_the_map_of_the_copy(void **state) {
+  (void)state;
+  const orb_map_params params = orb_map_params_of(ORB_PRESET_DEFAULT);
+  const int32_t keep_until = orb_map_keep_until(&params, 0);
+  scene s;
+  orb_copies copies;
+  double energy[2], far = 0, left = 0;
+  int improved;
+  open_scene(&s);
+  const orb_align_shape shapes[2] = {s.shape[1], s.shape[1]};
+  const size_t n = 3 * (size_t)s.mesh[1].vertex_count;
+  assert_int_equal(
+      orb_copies_create(s.ctx, shapes, 2, NULL, 0, orb_map_copy_size(&params, keep_until), keep_until, &copies),
+      ORB_OK);
+  orb_copied_shape *one = &copies.of[1];
+  orb_coarse_copy *copy = &one->copy;
+  orb_aligned_shape fixed = {.mesh = s.mesh[1], .points = orb_alloc(s.ctx, n, sizeof(double))};
+  assert_non_null(fixed.points);
+  memcpy(fixed.points, s.embedding[1].points, n * sizeof(double));
+  for (int32_t v = 0; v < copy->mesh.vertex_count; v++) {
+    twist(fixed.points + 3 * (size_t)copy->vertex[v], copy->points + 3 * (size_t)v);
+  }
+  const orb_map_guide guide = {.from = ORB_MAP_FROM_COPY,
+                               .copy = {copy->mesh.vertex_count, copy->vertex, copy->points, &one->hierarchy}};
+  assert_int_equal(orb_compose(s.ctx, &fixed, &one->whole, 0, 0, &guide, ORB_PRESET_DEFAULT, energy, &improved),
+                   ORB_OK);
+  assert_true(improved);
+  assert_true(energy[1] > 1.005);
+  for (int32_t v = 0; v < copy->mesh.vertex_count; v++) {
+    const double *twisted = copy->points + 3 * (size_t)v;
+    const size_t at = 3 * (size_t)copy->vertex[v];
+    far += sqrt(orb_distance2(fixed.points + at, twisted));
+    left += sqrt(orb_distance2(one->whole.points + at, twisted));
+  }
+  assert_true(left < 0.1 * far);
+  orb_free(s.ctx, fixed.points);
+  orb_copies_free(s.ctx, &copies);
+  close_scene(&s);
+}
+
 /* A failed allocation while the copies are made or lifted leaves nothing behind: the memory budget ends somewhere
  * within. */
 static void memory_may_end(void **state) {
@@ -234,8 +288,9 @@ static void memory_may_end(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(whole_shapes_meet_at_landmarks),
-                                     cmocka_unit_test(soft_landmarks_are_let_go),
-                                     cmocka_unit_test(whole_shapes_have_the_places), cmocka_unit_test(memory_may_end)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(whole_shapes_meet_at_landmarks), cmocka_unit_test(soft_landmarks_are_let_go),
+      cmocka_unit_test(whole_shapes_have_the_places), cmocka_unit_test(a_lift_keeps_the_map_of_the_copy),
+      cmocka_unit_test(memory_may_end)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "align/find/match.h"
+#include "elastic/body.h"
 #include "elastic/elastic.h"
 #include "elastic/searched.h"
 #include "elastic/slide.h"
@@ -289,6 +290,32 @@ static void a_slide_ends_where_shapes_do_not_fit(void **state) {
   push_close(&s);
 }
 
+/* A ball with shallow bumps and hollows. Where they are depends on the phase. */
+static orb_mesh bumpy_ball(double phase) {
+  orb_mesh mesh = shape_ball(ctx, 4);
+  for (int32_t v = 0; v < mesh.vertex_count; v++) {
+    double *p = mesh.positions + 3 * (size_t)v;
+    const double r = 1 + 0.03 * sin(8 * p[0] + phase) * sin(8 * p[1] + 1 - phase) * sin(8 * p[2] + 2 + phase);
+    for (int k = 0; k < 3; k++) {
+      p[k] *= r;
+    }
+  }
+  scale_to_sphere(&mesh);
+  return mesh;
+}
+
+/* Two balls fit each other however they lie. If the bumps of one are where the other has hollows, they do not say where
+ * it should slide. */
+static void a_slide_ends_where_reliefs_are_unrelated(void **state) {
+  (void)state;
+  for (int related = 0; related < 2; related++) {
+    const double other = related ? 0 : M_PI / 2;
+    push s = {bumpy_ball(0), bumpy_ball(other), bumpy_ball(other)};
+    assert_int_equal(slide(&s, NULL), related);
+    push_close(&s);
+  }
+}
+
 /* The result has the same bytes for any number of threads. */
 static void a_slide_is_the_same_on_any_threads(void **state) {
   (void)state;
@@ -306,6 +333,28 @@ static void a_slide_is_the_same_on_any_threads(void **state) {
   assert_memory_equal(s[0].start.positions, s[1].start.positions, 3 * (size_t)s[0].a.vertex_count * sizeof(double));
   push_close(&s[0]);
   push_close(&s[1]);
+}
+
+/* Each vertex of an icosahedron has its five neighbours once. All corners have 60°, and two triangles lie beside an
+ * edge. */
+static void a_body_lists_its_edges_once(void **state) {
+  (void)state;
+  orb_mesh mesh = shape_icosahedron(ctx);
+  orb_body body = {0};
+  assert_int_equal(orb_body_create(ctx, &mesh, &body), ORB_OK);
+  assert_int_equal(body.start[body.count], 60);
+  for (int32_t v = 0; v < body.count; v++) {
+    int32_t seen = 0;
+    assert_int_equal(body.start[v + 1] - body.start[v], 5);
+    for (int32_t i = body.start[v]; i < body.start[v + 1]; i++) {
+      assert_int_not_equal(body.next[i], v);
+      assert_false(seen & 1 << body.next[i]);
+      seen |= 1 << body.next[i];
+      assert_true(fabs(body.weight[i] - 1 / sqrt(3)) < 1e-12);
+    }
+  }
+  orb_body_free(ctx, &body);
+  shape_free(ctx, &mesh);
 }
 
 /* Surroundings that are listed beforehand change nothing. */
@@ -493,7 +542,9 @@ int main(void) {
                                      cmocka_unit_test(a_slide_undoes_a_push),
                                      cmocka_unit_test(an_anchor_leads_a_slide),
                                      cmocka_unit_test(a_slide_ends_where_shapes_do_not_fit),
+                                     cmocka_unit_test(a_slide_ends_where_reliefs_are_unrelated),
                                      cmocka_unit_test(a_slide_is_the_same_on_any_threads),
+                                     cmocka_unit_test(a_body_lists_its_edges_once),
                                      cmocka_unit_test(surroundings_are_shared),
                                      cmocka_unit_test(wrong_limbs_bend),
                                      cmocka_unit_test(a_copy_is_matched),

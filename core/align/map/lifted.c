@@ -18,7 +18,8 @@ static void set_start(orb_map_run *c, const orb_map_level_map *copy) {
   }
 }
 
-/* The vertices of the copy should stay where they are. */
+/* The vertices of the copy should stay where they are. Only if landmarks are soft, the map must go back: on copies they
+ * are pinned. */
 static void set_targets(orb_map_run *c, const orb_map_level *l) {
   memset(c->doubted, ORB_MAP_NO_TARGET, (size_t)c->vertex_count);
   for (int32_t v = 0; v < l->count; v++) {
@@ -48,7 +49,8 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
     goto done;
   }
   set_targets(c, &level);
-  status = orb_map_levels_finish(c, r, &level, 0, c->params.copies.hold, c->vertex_count > c->params.copies.rough);
+  status = orb_map_levels_finish(c, r, &level, 0, c->springs.count > 0 ? 0 : c->params.copies.hold,
+                                 c->vertex_count > c->params.copies.rough);
 done:
   orb_map_level_free(c->ctx, &level);
   orb_refiner_destroy(c->ctx, r);

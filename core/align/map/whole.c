@@ -120,12 +120,12 @@ int orb_map_run_is_hopeless(const orb_map_run *c) {
   return c->course.is_beaten || (c->given_target && c->best_energy > c->params.targets.hopeless);
 }
 
-/* Should the map slide? Yes, if it is not poor, or begins with targets on spheres that keep angles. A slide ends where
- * shapes do not fit: of 42 maps of animals of other kinds with landmarks, it changes one, and takes a fifth off its
- * error. A poor landmark walk stays; so does a walk that came first because the shapes bend much: of 14 such pairs and
- * 20 of animals, none fitted in space. */
+/* Should the map slide? Yes, if it is no isometry, and not poor, or begins with targets on spheres that keep angles. A
+ * slide ends where shapes do not fit: of 42 maps of animals of other kinds with landmarks, it changes one, and takes a
+ * fifth off its error. A poor landmark walk stays; so does a walk that came first because the shapes bend much: of 14
+ * such pairs and 20 of animals, none fitted in space. */
 static int should_slide(const orb_map_run *c, orb_map_from from) {
-  if (c->walks_first && c->course.is_walked) {
+  if ((c->walks_first && c->course.is_walked) || c->best_energy <= c->params.slide.least) {
     return 0;
   }
   return (c->given_target || from == ORB_MAP_FROM_WALK) &&

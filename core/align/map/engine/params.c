@@ -96,6 +96,7 @@ static const orb_map_params DEFAULTS = {
               .arrived = 0.8,
               .tries = 3,
               .weaker = 0.3,
+              .least = 1.005,
               .most = 1.1},
     .part = {.scale = 1.32, .spread = 1.4, .off = 0.05, .facing = 0.8, .least = 0.3, .most = 2.5},
     .near = {.few = 30,

@@ -242,6 +242,8 @@ typedef struct orb_map_params {
     int tries;      /* of a draw, as long as none is taken, */
     double weaker;  /* each with this share of the last one's pull. A first guess: a horse that runs, drawn to a cow,
                        came 1 % too high with all of it, and with 0.3 nearer to the truth by a quarter */
+    double least;   /* energy of a map up to which it does not slide: it is an isometry up to the triangles, and a slide
+                       would follow those. Not varied; one person in two poses has 1.02 and more */
     double most;    /* energy afterwards, relative to before. With 1.03, maps of animals of two kinds stayed: their
                        relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
   } slide;
