@@ -11,7 +11,7 @@ typedef struct orb_body {
   double *mass;         /* a third of the area of the triangles around each vertex */
   orb_searched searched;
   int32_t *start, *next; /* the edges of vertex v are start[v] … start[v + 1] − 1 */
-  double *weight;        /* half the cotangents of both triangles, each clamped so that all weights are positive */
+  double *weight;        /* the sum of half the cotangents of both triangles, each clamped so that all are positive */
 } orb_body;
 
 /* Free `out` in any case; the mesh must outlive it. O(n). */

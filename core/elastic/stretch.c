@@ -58,7 +58,8 @@ static void gather_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* One round: the mean of a vertex and its neighbours, by their areas, with a neighbour counted twice. */
+/* One round: the mean of a vertex and its neighbours, by their areas, where a neighbour counts twice, once for each
+ * triangle beside the edge. */
 static void smooth_range(void *arg, int64_t begin, int64_t end, int thread) {
   const fitting *f = arg;
   const orb_body *body = f->body;

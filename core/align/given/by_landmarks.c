@@ -285,9 +285,9 @@ static orb_status hold(two_ways *c) {
 }
 
 /* If the landmarks show one body in two poses, a match comes first: it knows the surface between the landmarks, and if
- * its map is good, nothing is pinned. For 35 pairs of animals of one kind, landmark walks with 8 true landmarks have up
- * to three times the error of matches without any. If the match's map is less good and the pins cannot meet, it is
- * kept: it takes each landmark to its partner too. */
+ * its map has little energy, nothing is pinned. For 35 pairs of animals of one kind, landmark walks with 8 true
+ * landmarks have up to three times the error of matches without any. If the match's map is less good and the pins
+ * cannot meet, it is kept: it takes each landmark to its partner too. */
 orb_status orb_align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                   const orb_landmark *landmarks, int32_t landmark_count,
                                   const orb_align_options *options, orb_alignment *out) {

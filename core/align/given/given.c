@@ -116,10 +116,10 @@ static orb_status lift_shape(orb_context *ctx, orb_copied_shape *copied, const o
                              orb_preset preset, orb_alignment *alignment, double *energy) {
   const int32_t count = alignment->landmark_count;
   orb_aligned_shape *fixed = &alignment->shapes[0], *whole = &copied->whole;
-  orb_map_guide guide = {
-      .from = ORB_MAP_FROM_COPY,
-      .fits_parts = 1,
-      .copy = {copied->copy.mesh.vertex_count, copied->copy.vertex, alignment->shapes[s].points, &copied->hierarchy}};
+  orb_map_guide guide = {.from = ORB_MAP_FROM_COPY,
+                         .fits_parts = 1,
+                         .copy = {copied->copy.mesh.vertex_count, copied->copy.vertex, alignment->shapes[s].points,
+                                  &copied->hierarchy, orb_landmarks_soft(landmarks, count) > 0}};
   double energies[2];
   int improved = 0;
   orb_status status;

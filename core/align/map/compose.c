@@ -30,7 +30,7 @@
  * the moving shape is registered again through samples of it, and once at the end.
  *
  * A large shape is not moved as a whole: it is the fixed one, or a decimated copy of it has its map already, which is
- * refined (lifted.c).
+ * refined, with its vertices held where they are (lifted.c).
  *
  * Soft landmarks are pinned first, as all are. Then they are released, and springs hold them instead.
  */

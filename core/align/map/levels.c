@@ -165,12 +165,11 @@ done:
   return status;
 }
 
-orb_status orb_map_levels_finish(orb_map_run *c, orb_refiner *r, orb_map_level *l, double pull, double hold,
-                                 int rough) {
+orb_status orb_map_levels_finish(orb_map_run *c, orb_refiner *r, orb_map_level *l, const orb_map_finish *how) {
   int failed = 0;
   orb_map_level_store(c, l, r);
-  ORB_TRY(orb_map_levels_refine(c, r, l, pull, hold, rough, &failed));
-  if (!failed && (c->given_target || hold > 0)) { /* other starts compete with walks, which have no crumples */
+  ORB_TRY(orb_map_levels_refine(c, r, l, how->pull, how->hold, how->rough, &failed));
+  if (!failed && how->irons) {
     ORB_TRY(orb_map_iron(c, l));
     orb_map_level_store(c, l, r);
   }

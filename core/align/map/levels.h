@@ -34,9 +34,15 @@ ORB_MUST_CHECK orb_status orb_map_level_next(orb_map_run *run, orb_refiner *refi
 ORB_MUST_CHECK orb_status orb_map_levels_refine(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
                                                 double pull, double hold, int rough, int *failed);
 
-/* Stores a level without flips, refines it, and keeps the result as run->best if it is better. pull, hold, rough: see
- * orb_map_levels_refine(). */
+/* How a level is refined to all vertices. */
+typedef struct orb_map_finish {
+  double pull, hold; /* see orb_map_levels_refine() */
+  int rough;         /* likewise */
+  int irons;         /* 1: crumples of the result are ironed (engine/iron.h) */
+} orb_map_finish;
+
+/* Stores a level without flips, refines it, and keeps the result as run->best if it is better. */
 ORB_MUST_CHECK orb_status orb_map_levels_finish(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
-                                                double pull, double hold, int rough);
+                                                const orb_map_finish *how);
 
 #endif

@@ -18,8 +18,7 @@ static void set_start(orb_map_run *c, const orb_map_level_map *copy) {
   }
 }
 
-/* The vertices of the copy should stay where they are. Only if landmarks are soft, the map must go back: on copies they
- * are pinned. */
+/* The vertices of the copy should stay where they are. */
 static void set_targets(orb_map_run *c, const orb_map_level *l) {
   memset(c->doubted, ORB_MAP_NO_TARGET, (size_t)c->vertex_count);
   for (int32_t v = 0; v < l->count; v++) {
@@ -34,6 +33,8 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   orb_map_level level = {0};
   int32_t flips = 0;
   orb_status status;
+  const orb_map_finish finish = {
+      .hold = copy->lets_go ? 0 : c->params.copies.hold, .rough = c->vertex_count > c->params.copies.rough, .irons = 1};
   c->pairs.count = c->pairs.landmarks;
   orb_map_levels_adopt(c, copy->hierarchy);
   set_start(c, copy);
@@ -49,8 +50,7 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
     goto done;
   }
   set_targets(c, &level);
-  status = orb_map_levels_finish(c, r, &level, 0, c->springs.count > 0 ? 0 : c->params.copies.hold,
-                                 c->vertex_count > c->params.copies.rough);
+  status = orb_map_levels_finish(c, r, &level, &finish);
 done:
   orb_map_level_free(c->ctx, &level);
   orb_refiner_destroy(c->ctx, r);

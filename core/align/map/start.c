@@ -64,6 +64,7 @@ orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
   orb_map_level level = {0};
   int32_t flips = 1, size = start == ORB_MAP_SPATIAL ? c->params.level.spatial : c->params.level.mapped;
   int given_up = 0, is_given = start == ORB_MAP_GIVEN;
+  orb_map_finish finish = {.pull = is_given ? 0 : c->params.level.pull, .rough = is_given && c->params.work.rough};
   orb_status status;
   if (start == ORB_MAP_SPATIAL) {
     trust_folds(c);
@@ -83,8 +84,8 @@ orb_status orb_map_run_start(orb_map_run *c, orb_map_start start) {
   if (start == ORB_MAP_DRAWN) {
     ORB_GO(status, orb_map_draw(c, &level, c->hierarchy->surface.to_mesh), done);
   }
-  status =
-      orb_map_levels_finish(c, r, &level, is_given ? 0 : c->params.level.pull, 0, is_given && c->params.work.rough);
+  finish.irons = c->given_target != NULL; /* other starts compete with walks, which have no crumples */
+  status = orb_map_levels_finish(c, r, &level, &finish);
 done:
   orb_map_level_free(ctx, &level);
   orb_refiner_destroy(ctx, r);

@@ -144,7 +144,8 @@ static orb_status draw(orb_map_run *c) {
   const double before = c->best_energy;
   allow(c);
   ORB_TRY(orb_map_run_start(c, ORB_MAP_DRAWN));
-  c->drawn = c->best_energy / before;
+  c->last_draw.energy = c->best_energy;
+  c->last_draw.share = c->best_energy / before;
   return ORB_OK;
 }
 
@@ -189,8 +190,8 @@ static orb_status ask_rival(orb_map_run *c) {
   return ORB_OK;
 }
 
-/* Continues from the first start, until there is a map of shapes that correspond, or the rival has a better one. A poor
- * first map is often beaten, so the rival is asked before it is drawn. */
+/* Continues from the first start, until there is a map of shapes that correspond, or the rival has a better one. A
+ * first map of much energy is often beaten, so the rival is asked before it is drawn. */
 static orb_status run_starts(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   const int asks_first = c->rival.ask && c->best_energy > p->targets.asked_first;
@@ -228,19 +229,19 @@ static orb_status walk_towards(orb_map_run *c, int *walked) {
   return ORB_OK;
 }
 
-/* Continues from the map of all starts: passes, which may find a better basin than a poor map has, then a draw to the
- * bottom of the basin. Of 34 maps that were not poor, no pass brought one lower by more than 0.3 %. */
+/* Continues from the map of all starts: passes if it is poor, which may find a better basin, then a draw to the
+ * bottom of the basin, unless the last draw has led to this map and brought little. */
 static orb_status improve_started(orb_map_run *c) {
   const orb_map_params *p = &c->params;
   const double started = c->best_energy;
   if (started <= smooth_energy(c) || started > p->targets.hopeless) {
     return ORB_OK;
   }
-  if (started > p->energy.poor) {
+  if (started > p->targets.passed) {
     ORB_TRY(run_passes(c));
   }
-  const int is_drawn = !(c->best_energy < started) && c->drawn > p->targets.gain;
-  if (c->best_energy <= smooth_energy(c) || c->best_energy > p->targets.drawn || is_drawn) {
+  const int has_settled = !(c->best_energy < c->last_draw.energy) && c->last_draw.share > p->targets.gain;
+  if (c->best_energy <= smooth_energy(c) || c->best_energy > p->targets.drawn || has_settled) {
     return ORB_OK;
   }
   if (!(c->best_energy < started)) {

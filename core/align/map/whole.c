@@ -120,7 +120,8 @@ int orb_map_run_is_hopeless(const orb_map_run *c) {
   return c->course.is_beaten || (c->given_target && c->best_energy > c->params.targets.hopeless);
 }
 
-/* Should the map slide? Yes, if it is no isometry, and not poor, or begins with targets on spheres that keep angles. A
+/* Should the map slide? Not if it is an isometry. Otherwise yes, if it is not poor, or begins with targets on spheres
+ * that keep angles. A
  * slide ends where shapes do not fit: of 42 maps of animals of other kinds with landmarks, it changes one, and takes a
  * fifth off its error. A poor landmark walk stays; so does a walk that came first because the shapes bend much: of 14
  * such pairs and 20 of animals, none fitted in space. */

@@ -30,6 +30,7 @@ typedef struct orb_map_level_map {
   const int32_t *vertex;     /* of the moving shape */
   const double *points;      /* of these vertices on the sphere; 3 each */
   orb_hierarchy **hierarchy; /* of the moving shape; one level of it has these vertices. It is taken over */
+  int lets_go; /* soft landmarks were pinned on the copy, and the map must be free to leave where they have drawn it */
 } orb_map_level_map;
 
 /* What a run towards a target has led to. A bulk is the energy of a map with a low cap on each triangle
@@ -67,7 +68,7 @@ typedef struct orb_map_guide {
   orb_map_beat beat;    /* with a target */
   int fits_parts;       /* the landmarks may show that only parts of the shapes correspond (space/part.h) */
   orb_map_course *course; /* NULL, or set; the bulks with a target only */
-  orb_map_rival rival;    /* with a target: asked if the first start has led to no good map */
+  orb_map_rival rival;    /* with a target: asked if the first start leaves open which way is better */
   int walks_first; /* with a target and `both`: a walk is tried before the start from the targets, and in its place
                     where it leads to a map */
   int walks_early; /* with a target and `both`: if the first start leads to a poor map, a walk comes next, not last */

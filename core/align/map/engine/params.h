@@ -94,10 +94,10 @@ typedef struct orb_map_params {
                       whole shape costs less than a copy and its lift */
     int32_t rough; /* vertices above which the lift does not loosen its levels: that takes as long as all sweeps, and
                       brings less the finer a level is */
-    double hold;   /* pull that holds the vertices of a copy in its lift. Without it they go back from where a slide has
-                      taken them: with 8 landmarks, eight pairs of 26,000 vertices stay a fourth farther from the truth
-                      than on a fourth of the vertices; with 30, 300, 1,000 and 3,000, by 15, 6, 5 and 4 %. More raises
-                      the energy, by 0.3 % from 1,000 to 3,000 */
+    double hold;   /* pull that holds the vertices of a copy in its lift, as slide.pull. Without it they go back from
+                      where a slide has taken them: with 8 landmarks, eight pairs of 26,000 vertices stay 23 % farther
+                      from the truth than on a fourth of the vertices. They stay 15 % farther with 30, 6 % with 300, 5 %
+                      with 1,000 and 4 % with 3,000, which raises the energy by 0.3 % */
   } copies;
 
   /* From targets that are given. */
@@ -112,12 +112,15 @@ typedef struct orb_map_params {
                       more than this factor. With 1.25 to 1.32 three pairs of people came to 1.06 to 1.13 from it, two
                       of them to 1.10 and 1.25 from a coarser one; with 1.38 to 1.54 two pairs came to 1.22 to 1.88, and
                       to 1.14 to 1.23 from a coarser one */
-    double crumpled;  /* energy of the first start up to which it is drawn at once */
-    double drawn;     /* energy above which the map is not drawn: it stays caught */
-    double gain;      /* a map is drawn again if the first draw has brought the energy below this share. In 59 runs of
-                         people, animals and others, the second draw gained at most 0.1 % after a smaller gain, and up to
-                         4 % after a larger one */
-    double contested; /* energy above which the rival is asked. Where poses had 1.2 to 1.25, pins lost in 5 of 5 runs */
+    double crumpled; /* energy of the first start up to which it is drawn at once */
+    double drawn;    /* energy above which the map is not drawn: it stays caught */
+    double passed; /* energy of the map of all starts above which passes follow. Of 34 maps with less, none gained more
+                      than 0.3 %. With `quality` they always follow */
+    double gain;   /* a map is drawn again if the first draw has brought the energy below this share. In 59 runs of
+                      people, animals and others, the second draw gained at most 0.1 % after a smaller gain, and up to
+                      4 % after a larger one. With `quality` it always is */
+    double contested;   /* energy of a pose above which pins compete with it, as a rival or afterwards. Where poses had
+                           1.2 to 1.25, pins lost in 5 of 5 runs */
     double asked_first; /* energy above which it is asked before the map is drawn, which is work in vain if the rival
                            wins. Draws bring people from up to 1.3 to below `contested` */
   } targets;
@@ -242,8 +245,8 @@ typedef struct orb_map_params {
     int tries;      /* of a draw, as long as none is taken, */
     double weaker;  /* each with this share of the last one's pull. A first guess: a horse that runs, drawn to a cow,
                        came 1 % too high with all of it, and with 0.3 nearer to the truth by a quarter */
-    double least;   /* energy of a map up to which it does not slide: it is an isometry up to the triangles, and a slide
-                       would follow those. Not varied; one person in two poses has 1.02 and more */
+    double least;   /* energy of a map up to which it does not slide: it is an isometry but for how triangles lie, and a
+                       slide would follow those. Not varied; one person in two poses has 1.02 and more */
     double most;    /* energy afterwards, relative to before. With 1.03, maps of animals of two kinds stayed: their
                        relief costs 3 to 9 %, and brings them nearer to the truth by a quarter */
   } slide;

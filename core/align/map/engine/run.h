@@ -32,12 +32,12 @@ typedef struct orb_map_candidate {
   double energy;
 } orb_map_candidate;
 
-/* Why a vertex should not be where its target is. The first level of a start smooths such vertices. */
+/* Whether a vertex should be where its target is, or why not. The first level of a start smooths doubted vertices. */
 typedef enum orb_map_doubt {
   ORB_MAP_TRUSTED,
   ORB_MAP_FACES_AWAY, /* the fixed shape faces another way there */
   ORB_MAP_FOLDED,     /* it belongs to a fold that had to be unfolded; it no longer pulls */
-  ORB_MAP_NO_TARGET   /* it has none */
+  ORB_MAP_NO_TARGET   /* the vertex has none */
 } orb_map_doubt;
 
 enum { ORB_MAP_PINNED = 1, ORB_MAP_FREE = 2 }; /* values of run->keep */
@@ -86,12 +86,14 @@ typedef struct orb_map_run {
   double crumpled;   /* a start whose energy rises by more than this factor while flips are cleared is given up, */
   int is_crumpled;   /* and this is 1 */
   int has_started_coarser; /* from the targets that are given */
-  double drawn;            /* share of the energy that the last draw has left; 0: nothing was drawn */
-  int32_t hopeless_flips;  /* a start with more than one flip in this many triangles is given up */
-  double twisted_energy;   /* of the last map that was to be untwisted */
-  int passes;              /* registrations through samples of the best map that are left */
-  double settled;          /* energy of the map that the last pass brought no further: another pass would not either */
-  int64_t work;            /* vertex steps left for clearing flips and for further starts */
+  struct {
+    double energy, share; /* that it has left, and the share of the energy before; 0: nothing was drawn */
+  } last_draw;
+  int32_t hopeless_flips; /* a start with more than one flip in this many triangles is given up */
+  double twisted_energy;  /* of the last map that was to be untwisted */
+  int passes;             /* registrations through samples of the best map that are left */
+  double settled;         /* energy of the map that the last pass brought no further: another pass would not either */
+  int64_t work;           /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
 
 /* Leaves the run at least `steps` steps a vertex, so that a step that was given up does not starve the next one. */

@@ -318,7 +318,7 @@ static orb_status lift(rim_job *job, rim_hold how, double stiffness) {
   orb_copied_shape *one = &job->copies.of[1];
   const orb_map_guide guide = {
       .from = ORB_MAP_FROM_COPY,
-      .copy = {one->copy.mesh.vertex_count, one->copy.vertex, job->copy.points, &one->hierarchy}};
+      .copy = {one->copy.mesh.vertex_count, one->copy.vertex, job->copy.points, &one->hierarchy, 0}};
   int improved;
   ORB_TRY(compose(job, &job->moving, job->second, how, stiffness, guide, &improved));
   job->energy = improved ? job->energy : INFINITY;
