@@ -265,7 +265,9 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
     ORB_GO(status, orb_map_run_fit(&c, guide->from, energy[0]), done);
   } else if (guide->from == ORB_MAP_FROM_COPY) {
     ORB_GO(status, orb_map_lift(&c, &guide->copy), done);
-    ORB_GO(status, orb_map_run_fit(&c, guide->from, energy[0]), done);
+    if (guide->copy.lets_go) { /* parts no longer lie where the copy has fitted them */
+      ORB_GO(status, orb_map_run_fit(&c, guide->from, energy[0]), done);
+    }
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
     ORB_GO(status, untwist_and_fit(&c, guide->from, energy[0]), done);
