@@ -179,7 +179,7 @@ Numbers Buffers::accessor(int64_t index, size_t *width) const {
   }
   int64_t type = whole(a, "componentType", 0), source = whole(a, "bufferView", NONE);
   size_t count = static_cast<size_t>(whole(a, "count", 0));
-  bool normalized = cJSON_IsTrue(member(a, "normalized"));
+  bool normalized = is_normalized(a);
   Numbers out{Charged<double>(ctx_)};
   component_size(type);
   if (source == NONE) { /* zeros, which the sparse part changes */

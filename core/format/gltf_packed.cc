@@ -29,6 +29,11 @@ double nearest_share(double value, double most) {
 
 }  // namespace
 
+bool is_normalized(const cJSON *accessor) {
+  const int64_t type = whole(accessor, "componentType", 0);
+  return cJSON_IsTrue(member(accessor, "normalized")) && type >= 5120 && type <= 5123;
+}
+
 double component_most(int64_t type) {
   switch (type) {
     case 5120:
@@ -134,7 +139,7 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
     Values values{Numbers(points * width, 0, Charged<double>(ctx_)), width};
     /* Draco itself converts integers to fractions where its attribute is marked as normalized. */
     const int64_t type = whole(accessor, "componentType", 0);
-    const bool is_share = cJSON_IsTrue(member(accessor, "normalized")) && type != 5126;
+    const bool is_share = is_normalized(accessor);
     const double unit = is_share && !attribute->normalized() ? component_most(type) : 1;
     for (size_t i = 0; i < points; i++) {
       float value[4] = {0, 0, 0, 0};

@@ -16,6 +16,10 @@ inline constexpr char MESHOPT[] = "EXT_meshopt_compression", DRACO[] = "KHR_drac
 /* The largest value of a component, which a normalized one calls 1; 1 for floats. */
 double component_most(int64_t type);
 
+/* Whether an accessor's integers are shares of the largest one. glTF allows that for those of 8 and 16 bits; elsewhere
+ * `normalized` says nothing. */
+bool is_normalized(const cJSON *accessor);
+
 /* Bounds the rounding of an integer of 16 bits whose share of the largest value has been a 32-bit float. */
 const double SHARE_ERROR = 1.0 / 64;
 

@@ -95,7 +95,7 @@ struct Unpacker {
     }
     const size_t tight = values->width * static_cast<size_t>(component_size(type));
     const size_t stride = is_attribute ? (tight + 3) / 4 * 4 : tight; /* glTF aligns the attributes of vertices */
-    const bool normalized = cJSON_IsTrue(member(accessor, "normalized"));
+    const bool normalized = is_normalized(accessor);
     const Packed::Octets bytes = bytes_of(*values, type, normalized, stride);
     const int64_t view = editor->add_view(bytes.data(), bytes.size(),
                                           is_attribute ? ORB_GLTF_ARRAY_BUFFER : ORB_GLTF_ELEMENT_ARRAY_BUFFER,
