@@ -35,9 +35,9 @@ static const double MOVING_SHARE = 0.05, MOVING = 0.01;
 static const double BEND_MOST = 0.1;
 
 /* Shapes whose reliefs differ by more than this (orb_relief_noise()) at the start do not fit each other either: the
- * bumps and hollows of one say nothing of the other's. Of 255 slides of people and animals, those that led to a map
- * began with 0.36 at most. Of five other pairs, which began with 0.41 to 0.48, one came nearer to its true landmarks,
- * with 0.41. A cube with bumps on a round one began with 0.45, and went twice as far from them. */
+ * bumps and hollows of one say nothing of the other's. Of 255 slides of people and animals, of both halves, those that
+ * led to a map began with 0.36 at most. Of five other pairs, which began with 0.41 to 0.48, one came nearer to its true
+ * landmarks, with 0.41. A cube with bumps on a round one began with 0.45, and went twice as far from them. */
 static const double NOISE_MOST = 0.43;
 
 /* What a slide needs besides a registration. */

@@ -304,8 +304,8 @@ static orb_mesh bumpy_ball(double phase) {
   return mesh;
 }
 
-/* Two balls fit each other however they lie. If their bumps lie near each other, they slide; if each is where the other
- * has any, they do not say where to. */
+/* Two balls fit each other however they lie. If their bumps lie near each other, they slide; bumps that have nothing to
+ * do with each other do not say where to. */
 static void a_slide_ends_where_reliefs_are_unrelated(void **state) {
   (void)state;
   for (int related = 0; related < 2; related++) {
