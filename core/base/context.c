@@ -62,13 +62,13 @@ orb_status orb_context_create(const orb_context_options *options, orb_context **
   return ORB_OK;
 }
 
-orb_status orb_context_part(orb_context *ctx, int threads, orb_context **out) {
+orb_status orb_context_part(orb_context *ctx, orb_context **out) {
   orb_context *part = orb_alloc(ctx, 1, sizeof *part);
   if (!part) {
     return ORB_E_NO_MEMORY;
   }
   begin(part, ctx->root, &ctx->root->options);
-  part->options.threads = threads;
+  part->options.threads = 1;
   memcpy(part->hash_key, ctx->hash_key, sizeof part->hash_key);
   *out = part;
   return ORB_OK;

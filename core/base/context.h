@@ -11,10 +11,10 @@
 
 int64_t orb_context_max_triangles(const orb_context *ctx);
 
-/* A part of a context for a task that runs beside others (tasks.h): it has an error record and threads of its own, and
- * the budget, cancel flag, deadline and progress of ctx. What is allocated from the one may be freed from the other.
- * Destroy it before ctx. orb_threads() of it is that of ctx. */
-ORB_MUST_CHECK orb_status orb_context_part(orb_context *ctx, int threads, orb_context **out);
+/* A part of a context for a task that runs beside others (tasks.h): it has an error record and a pool of its own, which
+ * other threads may enter (parallel.h), and the budget, cancel flag, deadline and progress of ctx. What is allocated
+ * from the one may be freed from the other. Destroy it before ctx. orb_threads() of it is that of ctx. */
+ORB_MUST_CHECK orb_status orb_context_part(orb_context *ctx, orb_context **out);
 
 /* Reports progress. Any thread; reports that collide with another are dropped. */
 void orb_progress(orb_context *ctx, const char *stage, double fraction);

@@ -17,6 +17,9 @@
  * Threads spin for a short while before they sleep. If a thread spins in vain, it spins half as long the next time; so
  * on a busy machine, where spinning only uses up the job's share, threads soon stop spinning. If some threads cannot be
  * started, the loop runs on the others: results do not depend on how many there are.
+ *
+ * The pool of a task (tasks.h) has no threads of its own. Threads that have nothing else to do enter it, even while a
+ * loop runs, and stay until it stops.
  */
 #include "base/parallel.h"
 
@@ -58,7 +61,9 @@ typedef struct parallel_loop {
 struct orb_pool {
   pthread_mutex_t lock;
   pthread_cond_t wake, done;
-  int workers, stopping;
+  int own, stopping;   /* workers that the pool has started */
+  int guests;          /* workers that have entered and not left; under the lock */
+  atomic_int workers;  /* own ones and guests that have entered: each has a number, from 1 on */
   int spins;           /* of the caller, before it sleeps */
   atomic_int sleepers; /* workers that wait to be woken; written under the lock */
   loop_cost cost[COSTS];
@@ -120,7 +125,8 @@ static int claim_of(struct orb_pool *pool, struct range *range, parallel_loop *l
 /* Claims a chunk of the thread's own range, or of the next one that has any; 0 where none is left. */
 static int claim(struct orb_pool *pool, int thread, parallel_loop *loop, uint32_t *chunk) {
   const int ranges = atomic_load_explicit(&pool->ranges, memory_order_acquire);
-  for (int i = 0, at = thread; i < ranges; i++, at = at + 1 < ranges ? at + 1 : 0) {
+  int at = thread < ranges ? thread : 0; /* a guest that has entered during the loop has no range */
+  for (int i = 0; i < ranges; i++, at = at + 1 < ranges ? at + 1 : 0) {
     if (claim_of(pool, &pool->range[at], loop, chunk)) {
       return 1;
     }
@@ -176,23 +182,27 @@ static int next_loop(struct orb_pool *pool, uint32_t number, int *spins) {
   return !stop;
 }
 
-static void *worker_main(void *argument) {
-  struct worker *self = argument;
-  struct orb_pool *pool = self->ctx->pool;
+/* Takes part in the loops of a pool, as thread number `index`, until it stops. */
+static void work_for(struct orb_pool *pool, int index) {
   int spins = SPINS_MOST;
   uint32_t chunk, number;
   do {
     parallel_loop loop;
     number = newest_loop(pool);
-    while (claim(pool, self->index, &loop, &chunk)) {
-      run_chunk(&loop, chunk, self->index);
+    while (claim(pool, index, &loop, &chunk)) {
+      run_chunk(&loop, chunk, index);
       finish_chunk(pool);
     }
   } while (next_loop(pool, number, &spins));
+}
+
+static void *worker_main(void *argument) {
+  struct worker *self = argument;
+  work_for(self->ctx->pool, self->index);
   return NULL;
 }
 
-static struct orb_pool *pool_start(orb_context *ctx) {
+static struct orb_pool *pool_create(orb_context *ctx) {
   struct orb_pool *pool = orb_calloc(ctx, 1, sizeof *pool);
   if (!pool) {
     orb_error_clear(ctx); /* the loop then runs in the caller alone */
@@ -207,15 +217,60 @@ static struct orb_pool *pool_start(orb_context *ctx) {
   }
   atomic_store(&pool->wanted, UINT32_MAX);
   ctx->pool = pool;
+  return pool;
+}
+
+/* Creates a pool with threads of its own. */
+static struct orb_pool *pool_start(orb_context *ctx) {
+  struct orb_pool *pool = pool_create(ctx);
+  if (!pool) {
+    return NULL;
+  }
   for (int i = 0; i < ctx->options.threads - 1 && i < MAX_WORKERS; i++) {
     pool->worker[i].ctx = ctx;
     pool->worker[i].index = i + 1;
     if (pthread_create(&pool->worker[i].thread, NULL, worker_main, &pool->worker[i]) != 0) {
       break;
     }
-    pool->workers++;
+    pool->own++;
   }
+  atomic_store(&pool->workers, pool->own);
   return pool;
+}
+
+void orb_pool_open(orb_context *ctx) {
+  if (!ctx->pool) {
+    (void)pool_create(ctx);
+  }
+}
+
+int orb_pool_enter(orb_context *ctx) {
+  struct orb_pool *pool = ctx->pool;
+  if (!pool) {
+    return 0;
+  }
+  pthread_mutex_lock(&pool->lock);
+  int index = atomic_load(&pool->workers) + 1;
+  index = index < ctx->root->options.threads && index <= MAX_WORKERS ? index : 0;
+  if (index > 0) {
+    pool->guests++;
+    atomic_store(&pool->workers, index);
+  }
+  pthread_mutex_unlock(&pool->lock);
+  return index;
+}
+
+void orb_pool_help(orb_context *ctx, int index) {
+  struct orb_pool *pool = ctx->pool;
+  work_for(pool, index);
+  pthread_mutex_lock(&pool->lock);
+  pool->guests--;
+  pthread_cond_signal(&pool->done);
+  pthread_mutex_unlock(&pool->lock);
+}
+
+int orb_pool_threads(const orb_context *ctx) {
+  return ctx->pool ? atomic_load(&ctx->pool->workers) + 1 : ctx->options.threads;
 }
 
 void orb_pool_stop(orb_context *ctx) {
@@ -226,8 +281,11 @@ void orb_pool_stop(orb_context *ctx) {
   pthread_mutex_lock(&pool->lock);
   pool->stopping = 1;
   pthread_cond_broadcast(&pool->wake);
+  while (pool->guests > 0) {
+    pthread_cond_wait(&pool->done, &pool->lock);
+  }
   pthread_mutex_unlock(&pool->lock);
-  for (int i = 0; i < pool->workers; i++) {
+  for (int i = 0; i < pool->own; i++) {
     pthread_join(pool->worker[i].thread, NULL);
   }
   pthread_mutex_destroy(&pool->lock);
@@ -259,7 +317,8 @@ static void learn(loop_cost *cost, double seconds) {
 }
 
 static int is_worth_sharing(struct orb_pool *pool, double seconds) {
-  int awake = atomic_load_explicit(&pool->sleepers, memory_order_relaxed) < pool->workers;
+  int awake = atomic_load_explicit(&pool->sleepers, memory_order_relaxed) <
+              atomic_load_explicit(&pool->workers, memory_order_relaxed);
   return seconds > (awake ? WORTH_SHARING : WORTH_WAKING);
 }
 
@@ -292,7 +351,7 @@ static void hand_out(struct orb_pool *pool, const parallel_loop *loop, uint32_t 
   atomic_store_explicit(&pool->chunks, loop->chunks, memory_order_release);
   atomic_store_explicit(&pool->finished, 0, memory_order_release);
   unsigned long long number = newest_loop(pool) + 1ULL;
-  uint32_t threads = (uint32_t)pool->workers + 1;
+  uint32_t threads = (uint32_t)atomic_load(&pool->workers) + 1;
   atomic_store_explicit(&pool->ranges, (int)threads, memory_order_release);
   for (uint32_t i = threads; i-- > 0;) { /* the range that shows the number comes last */
     uint64_t left = loop->chunks;        /* ranges of all chunks: those of `first` and before are the caller's */
@@ -341,9 +400,11 @@ static void run_shared(struct orb_pool *pool, const parallel_loop *loop, uint32_
   }
   if (own > 0) {
     learn(cost, (orb_clock() - start) / (double)(own * loop->grain));
+  } else { /* others were quicker: so short is the loop */
+    learn(cost, (orb_clock() - start) / (double)loop->count);
   }
   await(pool, loop->chunks - first - own);
-  for (int i = 0; i <= pool->workers; i++) {
+  for (int i = 0; i < atomic_load(&pool->ranges); i++) {
     atomic_store(&pool->range[i].ticket, (unsigned long long)newest_loop(pool) << 32 | (uint32_t)CLOSED);
   }
 }
@@ -355,7 +416,8 @@ static void run_loop(orb_context *ctx, int64_t start, int64_t count, int64_t gra
   struct orb_pool *pool = ctx->pool;
   parallel_loop loop = {.body = body, .arg = arg, .start = start, .count = count, .grain = grain};
   loop.chunks = (uint32_t)((count + grain - 1) / grain);
-  if (loop.chunks < 2 || ctx->options.threads == 1 || (!pool && !(pool = pool_start(ctx))) || pool->workers == 0) {
+  if (loop.chunks < 2 || (!pool && ctx->options.threads == 1) || (!pool && !(pool = pool_start(ctx))) ||
+      atomic_load_explicit(&pool->workers, memory_order_acquire) == 0) {
     for (uint32_t i = 0; i < loop.chunks; i++) {
       run_chunk(&loop, i, 0);
     }

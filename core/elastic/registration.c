@@ -4,6 +4,7 @@
 
 #include "base/check.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
@@ -128,7 +129,7 @@ double orb_registration_bend(const orb_registration *r) {
 }
 
 void orb_registration_free(orb_registration *r) {
-  orb_factor_destroy(r->factor);
+  orb_factor_destroy(r->ctx, r->factor);
   orb_body_free(r->ctx, &r->a);
   orb_body_free(r->ctx, &r->b);
   orb_free(r->ctx, r->normal);
@@ -143,10 +144,10 @@ void orb_registration_free(orb_registration *r) {
   orb_free(r->ctx, r->visit);
 }
 
-static orb_status factor_create(orb_registration *r) {
+static orb_status factor_create(orb_context *ctx, orb_registration *r) {
   const orb_body *a = &r->a;
   int64_t count = 0;
-  orb_coupling *couplings = ORB_NEW(r->ctx, orb_coupling, 3 * (size_t)a->mesh->triangle_count);
+  orb_coupling *couplings = ORB_NEW(ctx, orb_coupling, 3 * (size_t)a->mesh->triangle_count);
   if (!couplings) {
     return ORB_E_NO_MEMORY;
   }
@@ -157,16 +158,37 @@ static orb_status factor_create(orb_registration *r) {
       }
     }
   }
-  orb_status status = orb_factor_create(r->ctx, a->count, couplings, count, &r->factor);
-  orb_free(r->ctx, couplings);
+  orb_status status = orb_factor_create(ctx, a->count, couplings, count, &r->factor);
+  orb_free(ctx, couplings);
   return status;
 }
 
+/* What the two meshes need, each for itself. */
+typedef struct meshes {
+  orb_registration *r;
+  const orb_mesh *mesh[2];
+} meshes;
+
+static orb_status create_body(orb_context *ctx, void *arg, int32_t s) {
+  const meshes *m = arg;
+  orb_registration *r = m->r;
+  ORB_TRY(orb_body_create(ctx, m->mesh[s], s == 0 ? &r->a : &r->b));
+  if (s == 1) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_searched_create(ctx, m->mesh[0]->positions, r->a.normal, r->a.count, &r->searched));
+  return factor_create(ctx, r);
+}
+
 orb_status orb_registration_create(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_registration *r) {
-  size_t n = (size_t)a->vertex_count;
-  ORB_TRY(orb_body_create(ctx, a, &r->a));
-  ORB_TRY(orb_body_create(ctx, b, &r->b));
-  ORB_TRY(orb_searched_create(ctx, a->positions, r->a.normal, a->vertex_count, &r->searched));
+  const size_t n = (size_t)a->vertex_count;
+  meshes both = {r, {a, b}};
+  if (r->is_alone) {
+    ORB_TRY(orb_tasks_run(ctx, 2, create_body, &both));
+  } else {
+    ORB_TRY(create_body(ctx, &both, 0));
+    ORB_TRY(create_body(ctx, &both, 1));
+  }
   r->normal = ORB_NEW(ctx, double, 3 * n);
   r->diagonal = ORB_NEW(ctx, double, n);
   r->right = ORB_NEW(ctx, double, 3 * n);
@@ -179,5 +201,5 @@ orb_status orb_registration_create(orb_context *ctx, const orb_mesh *a, const or
   }
   memset(r->place, -1, n * sizeof *r->place); /* no hints for the first round */
   memset(r->visit, -1, (size_t)b->vertex_count * sizeof *r->visit);
-  return factor_create(r);
+  return ORB_OK;
 }

@@ -12,6 +12,7 @@
 
 #include "base/check.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 #include "elastic/rounds.h"
 #include "numeric/vec3.h"
 
@@ -45,7 +46,13 @@ typedef struct slide {
   orb_registration r;
   orb_stretch stretch;
   orb_relief relief[2]; /* of a and b */
+  double grain;
 } slide;
+
+static orb_status create_relief(orb_context *ctx, void *arg, int32_t i) {
+  slide *s = arg;
+  return orb_relief_create(ctx, i == 0 ? &s->r.a : &s->r.b, s->grain, &s->relief[i]);
+}
 
 static orb_status prepare_slide(slide *s) {
   orb_registration *r = &s->r;
@@ -58,11 +65,9 @@ static orb_status prepare_slide(slide *s) {
     return ORB_E_NO_MEMORY;
   }
   memcpy(r->last, r->pose->position, n * sizeof *r->last);
-  const double grain = orb_relief_grain(&r->a, &r->b);
-  ORB_TRY(orb_relief_create(r->ctx, &r->a, grain, s->relief));
-  ORB_TRY(orb_relief_create(r->ctx, &r->b, grain, s->relief + 1));
+  s->grain = orb_relief_grain(&r->a, &r->b);
   r->relief = s->relief;
-  return ORB_OK;
+  return orb_tasks_run(r->ctx, 2, create_relief, s);
 }
 
 /* Has the last round of a slide moved much of it? */

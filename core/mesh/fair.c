@@ -151,7 +151,7 @@ static orb_status solve(plate *p, double *x) {
   if (status == ORB_OK) {
     orb_factor_solve3(factor, right, x);
   }
-  orb_factor_destroy(factor);
+  orb_factor_destroy(p->ctx, factor);
   orb_free(p->ctx, couplings);
   orb_free(p->ctx, diagonal);
   orb_free(p->ctx, right);

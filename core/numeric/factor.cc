@@ -16,7 +16,7 @@ using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
 using Entry = Eigen::Triplet<double>;
 
-// A block of the context that nobody touches. It stands for memory that Eigen takes.
+// A block of the context that nobody touches. It stands for memory that Eigen takes for a while.
 class Charge {
  public:
   Charge(orb_context *ctx, size_t bytes) : ctx_(ctx), block_(orb_alloc(ctx, bytes, 1)) {
@@ -63,7 +63,7 @@ void fill(orb_context *ctx, Matrix *matrix, const orb_coupling *couplings, int64
 struct orb_factor {
   Matrix matrix;
   Solver solver;
-  std::unique_ptr<Charge> charge;
+  void *charged = nullptr;  // a block of the context that nobody touches: it stands for what Eigen keeps
 };
 
 extern "C" orb_status orb_factor_create(orb_context *ctx, int32_t n, const orb_coupling *couplings, int64_t count,
@@ -75,7 +75,10 @@ extern "C" orb_status orb_factor_create(orb_context *ctx, int32_t n, const orb_c
     fill(ctx, &factor->matrix, couplings, count);
     factor->solver.analyzePattern(factor->matrix);  // the factor's memory is not touched before it is computed
     const size_t entries = 2 * static_cast<size_t>(factor->matrix.nonZeros()) + factor->solver.entries();
-    factor->charge = std::make_unique<Charge>(ctx, entries * ENTRY_BYTES + static_cast<size_t>(n) * UNKNOWN_BYTES);
+    factor->charged = orb_alloc(ctx, entries * ENTRY_BYTES + static_cast<size_t>(n) * UNKNOWN_BYTES, 1);
+    if (factor->charged == nullptr) {
+      return ORB_E_NO_MEMORY;
+    }
     *out = factor.release();
     return ORB_OK;
   } catch (const std::exception &) {
@@ -83,8 +86,11 @@ extern "C" orb_status orb_factor_create(orb_context *ctx, int32_t n, const orb_c
   }
 }
 
-extern "C" void orb_factor_destroy(orb_factor *factor) {
-  delete factor;
+extern "C" void orb_factor_destroy(orb_context *ctx, orb_factor *factor) {
+  if (factor != nullptr) {
+    orb_free(ctx, factor->charged);
+    delete factor;
+  }
 }
 
 extern "C" orb_status orb_factor_compute(orb_factor *factor, const double *diagonal) {

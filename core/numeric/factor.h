@@ -21,7 +21,7 @@ typedef struct orb_coupling {
  * of the context: O(n log n) for a surface. */
 ORB_MUST_CHECK orb_status orb_factor_create(orb_context *ctx, int32_t n, const orb_coupling *couplings, int64_t count,
                                             orb_factor **out);
-void orb_factor_destroy(orb_factor *factor);
+void orb_factor_destroy(orb_context *ctx, orb_factor *factor); /* NULL is fine */
 
 /* Factorises with this diagonal, which must make the sum of every row positive. O(n^1.5) for a surface. */
 ORB_MUST_CHECK orb_status orb_factor_compute(orb_factor *factor, const double *diagonal);

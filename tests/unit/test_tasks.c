@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 
@@ -173,9 +174,57 @@ static void progress_is_the_callers(void **unused) {
   }
 }
 
+typedef struct helped {
+  atomic_int by[9]; /* chunks by thread */
+  atomic_int wrong; /* threads that there are not */
+  int threads, is_helped;
+} helped;
+
+/* Takes a millisecond, so a loop of a few is worth sharing. */
+static void work_slowly(void *arg, int64_t begin, int64_t end, int thread) {
+  helped *h = arg;
+  const struct timespec pause = {.tv_nsec = 1000000};
+  (void)begin;
+  (void)end;
+  if (thread < 0 || thread >= h->threads) {
+    atomic_fetch_add(&h->wrong, 1);
+  } else {
+    atomic_fetch_add(&h->by[thread], 1);
+  }
+  nanosleep(&pause, NULL);
+}
+
+/* Task 1 runs loops until another thread takes part, or for ten seconds. The others end at once. */
+static orb_status wait_for_help(orb_context *ctx, void *arg, int32_t task) {
+  helped *h = arg;
+  for (int i = 0; task == 1 && i < 1000 && !h->is_helped; i++) {
+    orb_parallel_for(ctx, 10, 1, work_slowly, h);
+    for (int t = 1; t < h->threads; t++) {
+      h->is_helped |= atomic_load(&h->by[t]) > 0;
+    }
+  }
+  return ORB_OK;
+}
+
+static void idle_threads_help(void **unused) {
+  (void)unused;
+  for (size_t t = 0; t < sizeof threads_tried / sizeof *threads_tried; t++) {
+    helped h = {.threads = threads_tried[t]};
+    if (h.threads == 1) {
+      continue;
+    }
+    orb_context *ctx = context_of(h.threads, 0);
+    assert_int_equal(orb_tasks_run(ctx, 2, wait_for_help, &h), ORB_OK);
+    assert_true(h.is_helped);
+    assert_int_equal(atomic_load(&h.wrong), 0);
+    orb_context_destroy(ctx);
+  }
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(each_task_once), cmocka_unit_test(first_failure_is_told),
-                                     cmocka_unit_test(budget_is_shared), cmocka_unit_test(cancelling_reaches_all),
-                                     cmocka_unit_test(progress_is_the_callers)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(each_task_once),          cmocka_unit_test(first_failure_is_told),
+      cmocka_unit_test(budget_is_shared),        cmocka_unit_test(cancelling_reaches_all),
+      cmocka_unit_test(progress_is_the_callers), cmocka_unit_test(idle_threads_help)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

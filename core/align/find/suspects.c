@@ -19,6 +19,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 #include "elastic/carry.h"
 #include "elastic/elastic.h"
 #include "numeric/vec3.h"
@@ -225,35 +226,61 @@ static void add_suspect(orb_alignment *out, const orb_suspect *one) {
   out->suspects[i] = *one;
 }
 
+/* What is known of the landmarks between the first shape and another one, in both directions. */
+typedef struct inquiry {
+  const orb_align_shape *shapes;
+  const orb_landmark *landmarks;
+  const orb_alignment *alignment;
+  int32_t shape; /* the other one */
+  side sides[2];
+  orb_place *end[2];
+  double *drift[2];
+} inquiry;
+
+static orb_status open_side(orb_context *ctx, void *arg, int32_t s) {
+  inquiry *q = arg;
+  const int32_t shape = s ? q->shape : 0;
+  return side_create(ctx, q->shapes[shape].mesh, &q->alignment->shapes[shape], &q->sides[s]);
+}
+
+static orb_status read_side(orb_context *ctx, void *arg, int32_t s) {
+  inquiry *q = arg;
+  return read_map(ctx, &q->sides[s], &q->sides[1 - s]);
+}
+
+static orb_status drift_from(orb_context *ctx, void *arg, int32_t s) {
+  inquiry *q = arg;
+  return drifts(ctx, q->sides, s, q->landmarks, q->shape, q->alignment->landmark_count, q->end[s], q->drift[s]);
+}
+
 static orb_status judge(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks, int32_t shape,
                         double cap, orb_alignment *out) {
-  int32_t count = out->landmark_count;
-  side sides[2] = {0};
-  orb_place *end[2] = {ORB_NEW(ctx, orb_place, count), ORB_NEW(ctx, orb_place, count)};
-  double *drift[2] = {ORB_NEW(ctx, double, count), ORB_NEW(ctx, double, count)};
+  const int32_t count = out->landmark_count;
+  inquiry q = {.shapes = shapes,
+               .landmarks = landmarks,
+               .alignment = out,
+               .shape = shape,
+               .end = {ORB_NEW(ctx, orb_place, count), ORB_NEW(ctx, orb_place, count)},
+               .drift = {ORB_NEW(ctx, double, count), ORB_NEW(ctx, double, count)}};
   double *share = ORB_NEW(ctx, double, count);
-  orb_status status = end[0] && end[1] && drift[0] && drift[1] && share ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_status status = q.end[0] && q.end[1] && q.drift[0] && q.drift[1] && share ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     goto done;
   }
-  ORB_GO(status, side_create(ctx, shapes[0].mesh, &out->shapes[0], &sides[0]), done);
-  ORB_GO(status, side_create(ctx, shapes[shape].mesh, &out->shapes[shape], &sides[1]), done);
-  ORB_GO(status, read_map(ctx, &sides[0], &sides[1]), done);
-  ORB_GO(status, read_map(ctx, &sides[1], &sides[0]), done);
-  for (int from = 0; from < 2; from++) {
-    ORB_GO(status, drifts(ctx, sides, from, landmarks, shape, count, end[from], drift[from]), done);
-  }
-  ORB_GO(status, measure_shares(ctx, &sides[0], landmarks, count, cap, share), done);
+  ORB_GO(status, orb_tasks_run(ctx, 2, open_side, &q), done);
+  ORB_GO(status, orb_tasks_run(ctx, 2, read_side, &q), done);
+  ORB_GO(status, orb_tasks_run(ctx, 2, drift_from, &q), done);
+  ORB_GO(status, measure_shares(ctx, &q.sides[0], landmarks, count, cap, share), done);
   for (int32_t i = 0; i < count; i++) {
-    if (fmin(drift[0][i], drift[1][i]) >= DRIFT_LEAST) {
-      add_suspect(out, &(orb_suspect){i, shape, share[i], end[0][i], drift[0][i]});
+    if (fmin(q.drift[0][i], q.drift[1][i]) >= DRIFT_LEAST) {
+      add_suspect(out, &(orb_suspect){i, shape, share[i], q.end[0][i], q.drift[0][i]});
     }
   }
 done:
   for (int k = 0; k < 2; k++) {
-    side_free(ctx, &sides[k]);
-    orb_free(ctx, end[k]);
-    orb_free(ctx, drift[k]);
+    side_free(ctx, &q.sides[k]);
+    orb_free(ctx, q.end[k]);
+    orb_free(ctx, q.drift[k]);
   }
   orb_free(ctx, share);
   return status;

@@ -118,6 +118,24 @@ static orb_status ask_pins(void *user, double energy, int *goes_on) {
   return ORB_OK;
 }
 
+/* A match of which the target is not yet computed. */
+typedef struct aiming {
+  const orb_match *match; /* with room for it */
+  int32_t count;          /* vertices of the second shape */
+} aiming;
+
+/* Fills where the best map of a match takes the second shape. */
+static orb_status fill_target(orb_context *ctx, void *user) {
+  const aiming *one = user;
+  double *found;
+  orb_status status = orb_match_target(ctx, one->match, 0, 1, &found);
+  if (status == ORB_OK) {
+    memcpy(one->match->target, found, 3 * (size_t)one->count * sizeof *found);
+  }
+  orb_free(ctx, found);
+  return status;
+}
+
 /* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
  * partners, with all of them pinned. Soft landmarks exclude matches only if too few are exact. sure: that of the hint.
  * Raises the pose's worst energy, to INFINITY if there is no such match, or no such map. */
@@ -151,10 +169,16 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
   ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, competes, &match), done);
   p->is_unsure |= match.is_unsure;
   if (match.is_found) {
-    ORB_GO(status, orb_match_target(ctx, &match, 0, 1, &match.target), done);
+    match.target = ORB_NEW(ctx, double, 3 * (size_t)moving->mesh.vertex_count);
+    if (!match.target) {
+      status = ORB_E_NO_MEMORY;
+      goto done;
+    }
+    aiming one = {&match, moving->mesh.vertex_count};
     const int walks_first = competes && match.bend > ORB_FIND_WALKS_FIRST;
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE,
                                  .target = match.target,
+                                 .aim = {fill_target, &one},
                                  .fits_parts = 1,
                                  .keeps_angles = keeps_angles,
                                  .course = &course,

@@ -9,6 +9,7 @@
 #include "align/map/starts/landmark_walk.h"
 #include "base/check.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 
 void orb_map_run_free(orb_map_run *c) {
   orb_context *ctx = c->ctx;
@@ -35,13 +36,10 @@ void orb_map_run_free(orb_map_run *c) {
   orb_free(ctx, c->pairs.fixed);
 }
 
-orb_status orb_map_run_prepare(orb_map_run *c) {
-  orb_context *ctx = c->ctx;
+static orb_status prepare_moving(orb_context *ctx, orb_map_run *c) {
   const orb_mesh *mesh = &c->moving->mesh;
-  size_t n = (size_t)mesh->vertex_count;
+  const size_t n = (size_t)mesh->vertex_count;
   c->vertex_count = mesh->vertex_count;
-  ORB_TRY(orb_map_surface_create(ctx, c->fixed, &c->b));
-  ORB_TRY(orb_map_packed_create(ctx, &c->fixed->mesh, &c->b, &c->packed));
   c->x = ORB_NEW(ctx, double, 3 * n);
   c->normal = ORB_NEW(ctx, double, 3 * n);
   c->keep = ORB_NEW0(ctx, unsigned char, n);
@@ -68,6 +66,19 @@ orb_status orb_map_run_prepare(orb_map_run *c) {
   orb_map_normals(c->x, mesh->vertex_count, mesh->triangles, mesh->triangle_count, c->normal);
   memcpy(c->start, c->moving->points, 3 * n * sizeof *c->start);
   return ORB_OK;
+}
+
+static orb_status prepare_fixed(orb_context *ctx, orb_map_run *c) {
+  ORB_TRY(orb_map_surface_create(ctx, c->fixed, &c->b));
+  return orb_map_packed_create(ctx, &c->fixed->mesh, &c->b, &c->packed);
+}
+
+static orb_status prepare_one(orb_context *ctx, void *arg, int32_t s) {
+  return s == 0 ? prepare_fixed(ctx, arg) : prepare_moving(ctx, arg);
+}
+
+orb_status orb_map_run_prepare(orb_map_run *c) {
+  return orb_tasks_run(c->ctx, 2, prepare_one, c);
 }
 
 /* A run of these two shapes. */

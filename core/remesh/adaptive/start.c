@@ -14,6 +14,7 @@
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 #include "remesh/adaptive/collapse.h"
 #include "remesh/adaptive/thin.h"
 #include "remesh/common/supermesh.h"
@@ -259,13 +260,23 @@ end:
   return status;
 }
 
+/* Shapes that are thinned side by side. */
+typedef struct thinning {
+  const orb_remesh_job *job;
+  double limit2;
+  orb_net *thin;
+} thinning;
+
+static orb_status thin_one(orb_context *ctx, void *arg, int32_t s) {
+  const thinning *t = arg;
+  return orb_adaptive_thin_shape(ctx, t->job, s, t->limit2, &t->thin[s]);
+}
+
 orb_status orb_adaptive_start_from_thinned(orb_context *ctx, const orb_remesh_job *job, double limit2,
                                            orb_placed_net *placed) {
   orb_net *thin = ORB_NEW0(ctx, orb_net, job->shape_count), net = {0};
-  orb_status status = thin ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int32_t s = 0; s < job->shape_count && status == ORB_OK; s++) {
-    status = orb_adaptive_thin_shape(ctx, job, s, limit2, &thin[s]);
-  }
+  thinning all = {job, limit2, thin};
+  orb_status status = thin ? orb_tasks_run(ctx, job->shape_count, thin_one, &all) : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
     status = join_thinned(ctx, thin, job->shape_count, &net);
   }

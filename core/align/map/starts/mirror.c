@@ -16,6 +16,7 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/tasks.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
@@ -159,12 +160,12 @@ static orb_status try_plane(orb_context *ctx, mirror *m, const plane *start) {
   return ORB_OK;
 }
 
-/* Finds the planes of a shape; tries the diagonals only if no axis leads to a plane. */
-static orb_status mirror_create(orb_context *ctx, const orb_map_params *params, const orb_mesh *mesh, mirror *m) {
+/* Finds the planes of shape s; tries the diagonals only if no axis leads to a plane. */
+static orb_status find_planes(orb_context *ctx, void *arg, int32_t s) {
+  mirror *m = (mirror *)arg + s;
+  const orb_mesh *mesh = m->mesh;
   orb_extent extent;
   plane start[DIRECTIONS];
-  m->params = params;
-  m->mesh = mesh;
   orb_mesh_extent(mesh, &extent);
   m->diagonal = extent.diagonal > 0 ? extent.diagonal : 1;
   m->count = mesh->vertex_count < ORB_MAP_MIRROR_SAMPLES ? mesh->vertex_count : ORB_MAP_MIRROR_SAMPLES;
@@ -240,11 +241,10 @@ orb_status orb_map_mirror_landmarks(orb_context *ctx, const orb_map_params *para
     return ORB_E_NO_MEMORY;
   }
   for (int s = 0; s < 2; s++) {
-    ORB_GO(status, mirror_create(ctx, params, meshes[s], &m[s]), done);
-    if (m[s].plane_count == 0) {
-      goto done;
-    }
+    m[s].params = params;
+    m[s].mesh = meshes[s];
   }
+  ORB_GO(status, orb_tasks_run(ctx, 2, find_planes, m), done);
   if (!match_planes(m, landmarks, count, planes)) {
     goto done;
   }
