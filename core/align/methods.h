@@ -67,14 +67,15 @@ ORB_MUST_CHECK orb_status orb_align_held(orb_context *ctx, const orb_align_shape
 /* What the maps of all later shapes should reach. */
 typedef struct orb_aims {
   const double *const *targets; /* NULL, or for each shape but the first what orb_compose() takes */
+  orb_map_aim aim;              /* of two shapes: see orb_map_guide */
   int keep_angles;              /* the spheres of the shapes do */
   orb_map_beat beat;            /* see orb_map_guide */
   orb_map_course *course;       /* see orb_map_guide; that of the last shape */
   int walks_first, walks_early; /* see orb_map_guide */
 } orb_aims;
 
-/* Improves the maps from the first shape to the others (orb_compose()), since aligned landmarks alone do not make a
- * good morph. Fills alignment->energy. aims: NULL for none. */
+/* Improves the maps from the first shape to the others (orb_compose()), side by side, since aligned landmarks alone do
+ * not make a good morph. Fills alignment->energy. aims: NULL for none. */
 ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,
                                           const orb_aims *aims, orb_preset preset);
 

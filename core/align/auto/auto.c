@@ -39,6 +39,7 @@ typedef struct matches {
   double bend;            /* most over the shapes */
   int are_found;          /* all of them */
   int keep_angles;        /* the spheres of the shapes do */
+  int32_t moving_count;   /* vertices of the second shape */
 } matches;
 
 static void matches_free(orb_context *ctx, matches *m) {
@@ -70,7 +71,12 @@ static void gather(matches *m) {
 
 static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, int keep_angles,
                                matches *m) {
-  *m = (matches){.shape_count = shape_count, .clear = 1, .lead = INFINITY, .are_found = 1, .keep_angles = keep_angles};
+  *m = (matches){.shape_count = shape_count,
+                 .clear = 1,
+                 .lead = INFINITY,
+                 .are_found = 1,
+                 .keep_angles = keep_angles,
+                 .moving_count = shapes[shape_count - 1].mesh->vertex_count};
   m->of = ORB_NEW0(ctx, orb_match, shape_count);
   m->targets = ORB_NEW0(ctx, const double *, shape_count);
   m->vertex = ORB_NEW(ctx, int32_t, ORB_MATCH_PAIRS * (size_t)shape_count);
@@ -217,6 +223,25 @@ static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_opt
   return won.is_second ? choose_other(ctx, m, 0, NULL, won.clear) : ORB_OK;
 }
 
+/* Fills the target of the match of two shapes, for which there is room. */
+static orb_status fill_target(orb_context *ctx, void *user) {
+  matches *m = user;
+  double *target;
+  const orb_status status = orb_match_target(ctx, &m->of[1], 0, 1, &target);
+  if (status == ORB_OK) {
+    memcpy(m->of[1].target, target, 3 * (size_t)m->moving_count * sizeof *target);
+  }
+  orb_free(ctx, target);
+  return status;
+}
+
+/* Makes room for the target of the match of two shapes. */
+static orb_status reserve_target(orb_context *ctx, matches *m) {
+  m->of[1].target = ORB_NEW(ctx, double, 3 * (size_t)m->moving_count);
+  m->targets[1] = m->of[1].target;
+  return m->targets[1] ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
 /* Computes the targets of all matches. */
 static orb_status aim(orb_context *ctx, matches *m) {
   for (int32_t s = 1; s < m->shape_count; s++) {
@@ -268,8 +293,10 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   next_match next = {0};
   orb_status status;
   orb_map_course course = {0};
-  ORB_TRY(aim(ctx, m));
+  const int is_pair = m->shape_count == 2 && m->of[1].is_found;
+  ORB_TRY(is_pair ? reserve_target(ctx, m) : aim(ctx, m));
   const orb_aims aims = {.targets = m->targets,
+                         .aim = {is_pair ? fill_target : NULL, m},
                          .keep_angles = m->keep_angles,
                          .course = m->shape_count == 2 ? &course : NULL, /* only pairs have a next match */
                          .walks_first = m->bend > ORB_FIND_WALKS_FIRST,

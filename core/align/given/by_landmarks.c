@@ -12,6 +12,7 @@
 #include "align/sheet/sheet.h"
 #include "base/check.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 #include "numeric/vec3.h"
 
 /* Orders the landmarks so that each is as far as possible from those before it, on the first shape. vertex: theirs on
@@ -136,13 +137,29 @@ static orb_status fill_target(orb_context *ctx, void *user) {
   return status;
 }
 
-/* Composes the map to shape s towards a match that agrees with a few landmarks and that all of them draw to their
- * partners, with all of them pinned. Soft landmarks exclude matches only if too few are exact. sure: that of the hint.
- * Raises the pose's worst energy, to INFINITY if there is no such match, or no such map. */
-static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_angles) {
-  orb_context *ctx = c->ctx;
-  posed *p = &c->posed;
-  orb_alignment *a = &p->alignment;
+/* What the pose of one shape has led to. Without a match, or without a map, the energies are INFINITY. */
+typedef struct posed_map {
+  double energy, loose; /* loose: before the map is fitted in space */
+  int is_unsure;
+} posed_map;
+
+/* Shapes that are composed side by side. */
+typedef struct posing {
+  two_ways *ways;
+  double sure; /* that of the hint */
+  int keeps_angles;
+  posed_map *map; /* of each shape but the first */
+} posing;
+
+/* Composes the map to a shape towards a match that agrees with a few landmarks and that all of them draw to their
+ * partners, with all of them pinned. Soft landmarks exclude matches only if too few are exact. Several shapes share
+ * nothing that they write: only two shapes have pins. */
+static orb_status compose_posed(orb_context *ctx, void *arg, int32_t i) {
+  const posing *all = arg;
+  two_ways *c = all->ways;
+  const int32_t s = i + 1;
+  posed_map *out = &all->map[i];
+  orb_alignment *a = &c->posed.alignment;
   orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
   const int32_t count = a->landmark_count;
   const orb_preset preset = c->options->preset;
@@ -165,9 +182,9 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
                                .first = vertex[0],
                                .second = vertex[1],
                                .stretch = ORB_FIND_HINT_STRETCH_MOST,
-                               .sure = sure};
+                               .sure = all->sure};
   ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, competes, &match), done);
-  p->is_unsure |= match.is_unsure;
+  out->is_unsure = match.is_unsure;
   if (match.is_found) {
     match.target = ORB_NEW(ctx, double, 3 * (size_t)moving->mesh.vertex_count);
     if (!match.target) {
@@ -180,22 +197,36 @@ static orb_status compose_posed(two_ways *c, int32_t s, double sure, int keeps_a
                                  .target = match.target,
                                  .aim = {fill_target, &one},
                                  .fits_parts = 1,
-                                 .keeps_angles = keeps_angles,
+                                 .keeps_angles = all->keeps_angles,
                                  .course = &course,
                                  .rival = {competes ? ask_pins : NULL, c},
                                  .beat = {.energy = walks_first && c->walked ? c->loose : 0},
                                  .walks_first = walks_first};
     ORB_GO(status, orb_compose(ctx, fixed, moving, walks_first, count, &guide, preset, energies, &improved), done);
   }
-  const double energy = improved ? energies[1] : INFINITY;
-  a->energy += energy / (a->shape_count - 1);
-  const double loose = improved ? fmin(energy, course.loose) : INFINITY;
-  p->loose += loose / (a->shape_count - 1);
-  p->worst = fmax(p->worst, loose);
+  out->energy = improved ? energies[1] : INFINITY;
+  out->loose = improved ? fmin(energies[1], course.loose) : INFINITY;
 done:
   orb_match_free(ctx, &match);
   orb_free(ctx, vertex[0]);
   orb_free(ctx, vertex[1]);
+  return status;
+}
+
+/* Composes the maps to all shapes but the first. */
+static orb_status compose_to_all(two_ways *c, double sure, int keeps_angles) {
+  posed *p = &c->posed;
+  const int32_t count = c->shape_count - 1;
+  posing all = {c, sure, keeps_angles, ORB_NEW0(c->ctx, posed_map, count)};
+  orb_status status = all.map ? orb_tasks_run(c->ctx, count, compose_posed, &all) : ORB_E_NO_MEMORY;
+  p->alignment.energy = 0;
+  for (int32_t i = 0; i < count && status == ORB_OK; i++) {
+    p->alignment.energy += all.map[i].energy / count;
+    p->loose += all.map[i].loose / count;
+    p->worst = fmax(p->worst, all.map[i].loose);
+    p->is_unsure |= all.map[i].is_unsure;
+  }
+  orb_free(c->ctx, all.map);
   return status;
 }
 
@@ -219,10 +250,7 @@ static orb_status compose_all_posed(two_ways *c, double sure) {
         orb_align_by_method(ctx, even.shapes, c->shape_count, c->landmarks, c->landmark_count, &rotated, &p->alignment),
         end);
   }
-  p->alignment.energy = 0;
-  for (int32_t s = 1; s < c->shape_count && p->worst < INFINITY && status == ORB_OK; s++) {
-    status = compose_posed(c, s, sure, !alike);
-  }
+  status = compose_to_all(c, sure, !alike);
 end:
   orb_even_shapes_free(ctx, &even);
   return status;

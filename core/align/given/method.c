@@ -13,6 +13,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "base/tasks.h"
 
 static orb_status run_method(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const orb_landmark *landmarks,
                              int32_t landmark_count, const orb_align_options *options) {
@@ -86,29 +87,51 @@ end:
   return status;
 }
 
+/* The maps of several shapes to the first one. Each changes its own shape only, unless there are two shapes. */
+typedef struct composing {
+  orb_alignment *alignment;
+  orb_map_from from;
+  const orb_aims *aims;
+  orb_preset preset;
+  double *energy; /* of each map */
+} composing;
+
+static orb_status compose_one(orb_context *ctx, void *arg, int32_t i) {
+  const composing *all = arg;
+  const orb_aims *aims = all->aims;
+  orb_alignment *alignment = all->alignment;
+  const int32_t s = i + 1;
+  const orb_map_guide guide = {.from = all->from,
+                               .fits_parts = alignment->landmark_count > 0,
+                               .target = aims->targets ? aims->targets[s] : NULL,
+                               .aim = aims->aim,
+                               .keeps_angles = aims->keep_angles,
+                               .beat = aims->beat,
+                               .course = aims->course,
+                               .walks_first = aims->walks_first,
+                               .walks_early = aims->walks_early};
+  const int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || aims->targets);
+  double energy[2];
+  int improved;
+  ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, &guide,
+                      all->preset, energy, &improved));
+  all->energy[i] = energy[1];
+  return ORB_OK;
+}
+
 orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from, const orb_aims *aims,
                            orb_preset preset) {
   const orb_aims none = {0};
+  const int32_t count = alignment->shape_count - 1;
+  composing all = {alignment, from, aims ? aims : &none, preset, ORB_NEW(ctx, double, count)};
+  orb_status status = all.energy ? orb_tasks_run(ctx, count, compose_one, &all) : ORB_E_NO_MEMORY;
   double sum = 0;
-  aims = aims ? aims : &none;
-  for (int32_t s = 1; s < alignment->shape_count; s++) {
-    const orb_map_guide guide = {.from = from,
-                                 .fits_parts = alignment->landmark_count > 0,
-                                 .target = aims->targets ? aims->targets[s] : NULL,
-                                 .keeps_angles = aims->keep_angles,
-                                 .beat = aims->beat,
-                                 .course = aims->course,
-                                 .walks_first = aims->walks_first,
-                                 .walks_early = aims->walks_early};
-    double energy[2];
-    int improved;
-    int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || aims->targets);
-    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, &guide,
-                        preset, energy, &improved));
-    sum += energy[1];
+  for (int32_t i = 0; i < count && status == ORB_OK; i++) {
+    sum += all.energy[i];
   }
-  alignment->energy = sum / (alignment->shape_count - 1);
-  return ORB_OK;
+  alignment->energy = status == ORB_OK ? sum / count : alignment->energy;
+  orb_free(ctx, all.energy);
+  return status;
 }
 
 orb_status orb_align_are_alike(orb_context *ctx, orb_alignment *a, orb_preset preset, int *alike) {

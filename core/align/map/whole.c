@@ -68,13 +68,9 @@ static orb_status prepare_moving(orb_context *ctx, orb_map_run *c) {
   return ORB_OK;
 }
 
-static orb_status prepare_fixed(orb_context *ctx, orb_map_run *c) {
-  ORB_TRY(orb_map_surface_create(ctx, c->fixed, &c->b));
-  return orb_map_packed_create(ctx, &c->fixed->mesh, &c->b, &c->packed);
-}
-
 static orb_status prepare_one(orb_context *ctx, void *arg, int32_t s) {
-  return s == 0 ? prepare_fixed(ctx, arg) : prepare_moving(ctx, arg);
+  orb_map_run *c = arg;
+  return s == 0 ? orb_map_surface_create(ctx, c->fixed, &c->b) : prepare_moving(ctx, c);
 }
 
 orb_status orb_map_run_prepare(orb_map_run *c) {
@@ -109,17 +105,43 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                        .twisted_energy = INFINITY};
 }
 
+/* What a run that opens finds out, side by side. */
+typedef struct opening {
+  orb_map_run *run;
+  orb_map_run measured, paired; /* the run as it is before, for each of two tasks */
+  const orb_map_guide *guide;
+  double energy; /* of the map as given */
+} opening;
+
+enum { OPEN_PACKED, OPEN_ENERGY, OPEN_PAIRS, OPENINGS };
+
+static orb_status open_one(orb_context *ctx, void *arg, int32_t what) {
+  opening *o = arg;
+  orb_map_run *c = o->run;
+  if (what == OPEN_PACKED) {
+    return orb_map_packed_create(ctx, &c->fixed->mesh, &c->b, &c->packed);
+  }
+  if (what == OPEN_PAIRS) {
+    o->paired.ctx = ctx;
+    return orb_map_pairs_create(&o->paired);
+  }
+  o->measured.ctx = ctx;
+  return o->guide->from == ORB_MAP_FROM_COPY
+             ? ORB_OK
+             : orb_map_energy_of(&o->measured, o->measured.moving->points, o->measured.params.energy.cap, &o->energy);
+}
+
 /* Measures the map as given and finds the pairs. energy: as of orb_compose(), both of the map as given. */
 orb_status orb_map_run_open(orb_map_run *c, const orb_map_guide *guide, double energy[2]) {
   const orb_aligned_shape *moving = c->moving;
   ORB_TRY(orb_map_run_prepare(c));
-  energy[0] = INFINITY;
-  if (guide->from != ORB_MAP_FROM_COPY) {
-    ORB_TRY(orb_map_energy_of(c, moving->points, c->params.energy.cap, &energy[0]));
-  }
+  opening o = {c, *c, *c, guide, INFINITY};
+  const orb_status status = orb_tasks_run(c->ctx, OPENINGS, open_one, &o);
+  c->pairs = o.paired.pairs;
+  ORB_TRY(status);
+  energy[0] = o.energy;
   memcpy(c->best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c->best);
   c->best_energy = energy[0];
-  ORB_TRY(orb_map_pairs_create(c));
   if ((guide->target && c->pairs.landmarks > 0) /* the landmarks are apart */ || guide->from == ORB_MAP_FROM_SPRINGS) {
     energy[0] = c->best_energy = INFINITY;
   }

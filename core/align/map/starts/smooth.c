@@ -11,6 +11,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
@@ -87,6 +88,25 @@ static void relax(const smoothing *s, int32_t i) {
   double *x = s->point + 4 * (size_t)v;
   for (int j = 0; j < 4; j++) {
     x[j] += s->params->smooth.over * (sum[j] / all - x[j]);
+  }
+}
+
+/* Relaxes parts of the level, which do not depend on each other (engine/sweep.c). */
+static void relax_parts(void *arg, int64_t begin, int64_t end, int thread) {
+  const smoothing *s = arg;
+  const orb_map_level *l = s->level;
+  (void)thread;
+  for (int32_t i = l->group_start[begin * l->colours]; i < l->group_start[end * l->colours]; i++) {
+    relax(s, i);
+  }
+}
+
+/* All parts, then the border between them. */
+static void relax_all(orb_context *ctx, smoothing *s) {
+  const orb_map_level *l = s->level;
+  orb_parallel_for(ctx, l->parts, 1, relax_parts, s);
+  for (int32_t i = l->group_start[l->parts * l->colours]; i < l->moving; i++) {
+    relax(s, i);
   }
 }
 
@@ -167,9 +187,7 @@ orb_status orb_map_smooth(orb_map_run *c, orb_map_level *l, const int32_t *to_me
   doubt_outliers(&s, c->doubted, to_mesh);
   for (int round = 0; round < p->smooth.rounds; round++) {
     for (int sweep = 0; sweep < p->smooth.sweeps; sweep++) {
-      for (int32_t i = 0; i < l->moving; i++) {
-        relax(&s, i);
-      }
+      relax_all(c->ctx, &s);
       ORB_GO(status, orb_context_check(c->ctx), done);
     }
     doubt_folds(&s);
