@@ -57,9 +57,12 @@ static orb_status smooth_targets(orb_map_run *c) {
  * 24 landmarks, neither errors nor energies differ. */
 static orb_status register_first(orb_map_run *c) {
   int32_t smooth, given;
-  ORB_TRY(orb_map_levels_prepare(c));
   ORB_TRY(orb_map_register(c, 0));
-  if (c->walks_first || c->pairs.landmarks > 0) {
+  if (c->walks_first) { /* walks have levels of their own */
+    return ORB_OK;
+  }
+  ORB_TRY(orb_map_levels_prepare(c));
+  if (c->pairs.landmarks > 0) {
     return ORB_OK;
   }
   ORB_TRY(orb_map_start_flips(c, &given));
@@ -118,8 +121,9 @@ orb_status orb_map_target_walks(orb_map_run *c, orb_map_walked *out) {
 }
 
 /* From walks that the targets guide: the best of them is refined if it comes near the best map so far or below, and
- * below what the caller knows. Refined, it often has less energy. */
+ * below what the caller knows. Refined, it often has less energy. If it leads to no better map, other starts follow. */
 static orb_status start_guided(orb_map_run *c) {
+  const double before = c->best_energy;
   orb_map_walked best = {.energy = INFINITY};
   orb_status status = ORB_OK;
   if (c->drafted) {
@@ -134,7 +138,9 @@ static orb_status start_guided(orb_map_run *c) {
     allow(c);
     ORB_GO(status, orb_map_walked_refine(c, &best), done);
   }
-  status = orb_map_levels_prepare(c);
+  if (!(c->best_energy < before)) {
+    status = orb_map_levels_prepare(c);
+  }
 done:
   orb_map_walked_free(c, &best);
   return status;

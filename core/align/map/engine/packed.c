@@ -21,6 +21,7 @@ void orb_map_packed_free(orb_context *ctx, orb_map_packed *p) {
   orb_free(ctx, p->vertex_row);
   orb_free(ctx, p->triangle_row);
   orb_free(ctx, p->rotation);
+  orb_free(ctx, p->vertex);
   orb_free(ctx, p->to);
   orb_free(ctx, p->from);
   memset(p, 0, sizeof *p);
@@ -52,12 +53,11 @@ static void copy_surface(const orb_map_surface *b, const orb_corner_table *s, or
     size_t v = (size_t)s->to_mesh[i], to = 3 * (size_t)i;
     memcpy(p->b.x + to, b->x + 3 * v, sizeof(double[3]));
     memcpy(p->b.normal + to, b->normal + 3 * v, sizeof(double[3]));
-    memcpy(p->s + to, b->s + 3 * v, sizeof(double[3]));
+    p->vertex[i] = (int32_t)v;
   }
   for (int32_t i = 0; i < b->triangle_count; i++) {
     int32_t t = p->from[i];
     memcpy(p->b.frame + 6 * (size_t)i, b->frame + 6 * (size_t)t, sizeof(double[6]));
-    p->b.density[i] = b->density[t];
     for (int32_t k = 0; k < 3; k++) {
       int32_t twin = b->twin[3 * t + k];
       p->triangles[3 * i + k] = s->from_mesh[b->triangles[3 * t + k]];
@@ -68,7 +68,6 @@ static void copy_surface(const orb_map_surface *b, const orb_corner_table *s, or
 
 static void fill_vertex_row(const orb_map_surface *b, size_t v, double *row) {
   memcpy(row, b->x + 3 * v, sizeof(double[3]));
-  memcpy(row + 3, b->s + 3 * v, sizeof(double[3]));
   memcpy(row + 6, b->normal + 3 * v, sizeof(double[3]));
 }
 
@@ -85,7 +84,6 @@ static void fill_triangle_row(const orb_map_surface *b, size_t t, double *row) {
   row[2] = -u2 * inverse;
   row[3] = u1 * inverse;
   memcpy(row + 4, e1, sizeof(double[6]));
-  row[10] = b->density[t];
 }
 
 /* Unfolding over the edge keeps the angle to it, so the tangents differ by a rotation of the plane. */
@@ -125,10 +123,22 @@ static int reserve(orb_context *ctx, orb_map_packed *p) {
   p->vertex_row = ORB_NEW0(ctx, double, (size_t)ORB_MAP_ROW *n);
   p->triangle_row = ORB_NEW0(ctx, double, (size_t)ORB_MAP_ROW *m);
   p->rotation = ORB_NEW(ctx, double, 6 * m);
+  p->vertex = ORB_NEW(ctx, int32_t, n);
   p->to = ORB_NEW(ctx, int32_t, m);
   p->from = ORB_NEW(ctx, int32_t, m);
   return p->b.x && p->b.normal && p->b.twin && p->b.frame && p->b.density && p->s && p->triangles && p->vertex_row &&
-         p->triangle_row && p->rotation && p->to && p->from;
+         p->triangle_row && p->rotation && p->vertex && p->to && p->from;
+}
+
+void orb_map_packed_move(const orb_map_surface *b, orb_map_packed *p) {
+  for (size_t i = 0; i < (size_t)b->vertex_count; i++) {
+    const double *s = b->s + 3 * (size_t)p->vertex[i];
+    memcpy(p->s + 3 * i, s, sizeof(double[3]));
+    memcpy(p->vertex_row + ORB_MAP_ROW * i + 3, s, sizeof(double[3]));
+  }
+  for (size_t i = 0; i < (size_t)b->triangle_count; i++) {
+    p->b.density[i] = p->triangle_row[ORB_MAP_ROW * i + 10] = b->density[p->from[i]];
+  }
 }
 
 orb_status orb_map_packed_create(orb_context *ctx, const orb_mesh *mesh, const orb_map_surface *b,
@@ -146,6 +156,7 @@ orb_status orb_map_packed_create(orb_context *ctx, const orb_mesh *mesh, const o
   p.b.s = p.s;
   p.b.triangles = p.triangles;
   fill_rows(&p);
+  orb_map_packed_move(b, &p);
 done:
   orb_free(ctx, first);
   orb_corner_table_free(ctx, &s);

@@ -15,12 +15,16 @@ typedef struct orb_map_packed {
   double *triangle_row; /* ORB_MAP_ROW a triangle: derivatives of its second barycentric coordinate along both tangents,
                            and of the third; the tangents; the density. Without area the derivatives are NAN */
   double *rotation;     /* 2 per half-edge: cosine and sine from the tangents of its triangle to those of its twin's */
+  int32_t *vertex;      /* of each packed vertex: its number in the surface */
   int32_t *to, *from;   /* triangle numbers of the surface → packed ones, and back */
 } orb_map_packed;
 
 /* mesh: that of the surface. O(n). */
 ORB_MUST_CHECK orb_status orb_map_packed_create(orb_context *ctx, const orb_mesh *mesh, const orb_map_surface *b,
                                                 orb_map_packed *out);
+/* Follows the surface to other points on the sphere (orb_map_surface_move()). O(n). */
+void orb_map_packed_move(const orb_map_surface *b, orb_map_packed *p);
+
 void orb_map_packed_free(orb_context *ctx, orb_map_packed *p);
 
 /* Converts the places of a level to the packed surface, and back. Steps give the same bytes on both. */

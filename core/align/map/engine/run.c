@@ -51,21 +51,10 @@ orb_status orb_map_energy_of(orb_map_run *c, const double *points, double cap, d
   return status;
 }
 
-/* Builds the surface at the points that run->fixed_points says. */
-static orb_status rebuild(orb_map_run *c) {
-  orb_aligned_shape shape = {.mesh = c->fixed->mesh, .points = c->fixed_points ? c->fixed_points : c->fixed->points};
-  orb_map_surface b;
-  orb_map_packed packed;
-  ORB_TRY(orb_map_surface_create(c->ctx, &shape, &b));
-  orb_status status = orb_map_packed_create(c->ctx, &c->fixed->mesh, &b, &packed);
-  if (status != ORB_OK) {
-    orb_map_surface_free(c->ctx, &b);
-    return status;
-  }
-  orb_map_surface_free(c->ctx, &c->b);
-  orb_map_packed_free(c->ctx, &c->packed);
-  c->b = b;
-  c->packed = packed;
+/* Moves the surface to the points that run->fixed_points says. */
+static orb_status move_surface(orb_map_run *c) {
+  ORB_TRY(orb_map_surface_move(c->ctx, &c->b, c->fixed_points ? c->fixed_points : c->fixed->points));
+  orb_map_packed_move(&c->b, &c->packed);
   return ORB_OK;
 }
 
@@ -82,7 +71,7 @@ orb_status orb_map_take_sphere(orb_map_run *c, double **points) {
   c->best_energy = INFINITY;
   c->fixed_points = *points;
   *points = NULL;
-  return rebuild(c);
+  return move_surface(c);
 }
 
 orb_status orb_map_take_best(orb_map_run *c) {
@@ -101,5 +90,5 @@ orb_status orb_map_take_best(orb_map_run *c) {
   c->fixed_points = c->kept.fixed;
   c->best_energy = c->kept.energy;
   c->kept = (orb_map_candidate){0};
-  return rebuild(c);
+  return move_surface(c);
 }

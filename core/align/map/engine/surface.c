@@ -69,12 +69,30 @@ static void make_frame(const double *p, const double *q, const double *r, double
   }
 }
 
+static void fill_density(orb_map_surface *b) {
+  for (int32_t t = 0; t < b->triangle_count; t++) {
+    const int32_t *v = b->triangles + 3 * (size_t)t;
+    double n[3];
+    orb_triangle_normal(b->x + 3 * (size_t)v[0], b->x + 3 * (size_t)v[1], b->x + 3 * (size_t)v[2], n);
+    b->density[t] = orb_det(b->s + 3 * (size_t)v[0], b->s + 3 * (size_t)v[1], b->s + 3 * (size_t)v[2]) /
+                    (orb_length(n) + LEAST_TWICE_AREA);
+  }
+}
+
+orb_status orb_map_surface_move(orb_context *ctx, orb_map_surface *b, const double *s) {
+  orb_locator *locator;
+  ORB_TRY(orb_locator_create(ctx, s, b->vertex_count, b->triangles, b->triangle_count, b->twin, &locator));
+  orb_locator_destroy(ctx, b->locator);
+  b->locator = locator;
+  b->s = s;
+  fill_density(b);
+  return ORB_OK;
+}
+
 orb_status orb_map_surface_create(orb_context *ctx, const orb_aligned_shape *shape, orb_map_surface *out) {
   const orb_mesh *mesh = &shape->mesh;
-  orb_map_surface b = {.vertex_count = mesh->vertex_count,
-                       .triangle_count = mesh->triangle_count,
-                       .s = shape->points,
-                       .triangles = mesh->triangles};
+  orb_map_surface b = {
+      .vertex_count = mesh->vertex_count, .triangle_count = mesh->triangle_count, .triangles = mesh->triangles};
   orb_status status = ORB_E_NO_MEMORY;
   b.x = ORB_NEW(ctx, double, 3 * (size_t)b.vertex_count);
   b.normal = ORB_NEW(ctx, double, 3 * (size_t)b.vertex_count);
@@ -97,16 +115,9 @@ orb_status orb_map_surface_create(orb_context *ctx, const orb_aligned_shape *sha
   orb_map_normals(b.x, b.vertex_count, b.triangles, b.triangle_count, b.normal);
   for (int32_t t = 0; t < b.triangle_count; t++) {
     const int32_t *v = b.triangles + 3 * (size_t)t;
-    const double *p = b.x + 3 * (size_t)v[0], *q = b.x + 3 * (size_t)v[1], *r = b.x + 3 * (size_t)v[2];
-    double u[3], w[3], n[3];
-    make_frame(p, q, r, b.frame + 6 * (size_t)t);
-    orb_sub(q, p, u);
-    orb_sub(r, p, w);
-    orb_cross(u, w, n);
-    b.density[t] = orb_det(b.s + 3 * (size_t)v[0], b.s + 3 * (size_t)v[1], b.s + 3 * (size_t)v[2]) /
-                   (orb_length(n) + LEAST_TWICE_AREA);
+    make_frame(b.x + 3 * (size_t)v[0], b.x + 3 * (size_t)v[1], b.x + 3 * (size_t)v[2], b.frame + 6 * (size_t)t);
   }
-  ORB_GO(status, orb_locator_create(ctx, b.s, b.vertex_count, b.triangles, b.triangle_count, b.twin, &b.locator), fail);
+  ORB_GO(status, orb_map_surface_move(ctx, &b, shape->points), fail);
   *out = b;
   return ORB_OK;
 fail:

@@ -25,6 +25,9 @@ typedef struct orb_map_surface {
 ORB_MUST_CHECK orb_status orb_map_surface_create(orb_context *ctx, const orb_aligned_shape *shape,
                                                  orb_map_surface *out);
 
+/* The same surface with other points on the sphere, 3 per vertex, which are borrowed. O(n). */
+ORB_MUST_CHECK orb_status orb_map_surface_move(orb_context *ctx, orb_map_surface *b, const double *s);
+
 void orb_map_surface_free(orb_context *ctx, orb_map_surface *b);
 
 /* Position on the surface, on the sphere, and the interpolated normal of a place. Any output may be NULL. */
