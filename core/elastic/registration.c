@@ -20,19 +20,31 @@ void orb_registration_loop(orb_registration *r, int32_t count, orb_loop_fn body)
   }
 }
 
+/* The covariance of the edges at v, as given and now. */
+static void add_covariance(const orb_registration *r, int32_t v, double h[9]) {
+  const orb_body *a = &r->a;
+  for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
+    double p[3], q[3];
+    orb_sub(a->mesh->positions + 3 * (size_t)a->next[i], a->mesh->positions + 3 * (size_t)v, p);
+    orb_sub(r->pose->position + 3 * (size_t)a->next[i], r->pose->position + 3 * (size_t)v, q);
+    orb_add_outer(h, q, p, a->weight[i]);
+  }
+}
+
 static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
   orb_registration *r = arg;
-  const orb_body *a = &r->a;
   (void)thread;
-  for (int32_t v = (int32_t)begin; v < end; v++) {
-    double h[9] = {0};
-    for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
-      double p[3], q[3];
-      orb_sub(a->mesh->positions + 3 * (size_t)a->next[i], a->mesh->positions + 3 * (size_t)v, p);
-      orb_sub(r->pose->position + 3 * (size_t)a->next[i], r->pose->position + 3 * (size_t)v, q);
-      orb_add_outer(h, q, p, a->weight[i]);
+  for (int64_t first = begin; first < end; first += ORB_ROTATIONS) {
+    const int count = end - first < ORB_ROTATIONS ? (int)(end - first) : ORB_ROTATIONS;
+    double h[9][ORB_ROTATIONS] = {{0}};
+    for (int l = 0; l < count; l++) {
+      double one[9] = {0};
+      add_covariance(r, (int32_t)first + l, one);
+      for (int k = 0; k < 9; k++) {
+        h[k][l] = one[k];
+      }
     }
-    (void)orb_nearest_rotation(h, r->pose->rotation + 9 * (size_t)v);
+    orb_nearest_rotations(h, count, r->pose->rotation + 9 * first);
   }
 }
 

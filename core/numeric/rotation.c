@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "numeric/clones.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
@@ -105,4 +106,139 @@ int orb_nearest_rotation(const double h[9], double r[9]) {
     }
   }
   return 1;
+}
+
+/* A value of each of several matrices. */
+typedef double lanes[ORB_ROTATIONS];
+
+/* The symmetric 4×4 matrices of rotate_by_quaternion(), and what their characteristic polynomials need. */
+typedef struct quartics {
+  lanes a00, a01, a02, a03, a11, a12, a13, a22, a23, a33;
+  lanes squares, det, c0;
+} quartics;
+
+/* The elements of the adjugate of a symmetric 4×4 matrix, by its 2×2 minors. */
+typedef struct adjugate {
+  double b00, b01, b02, b03, b11, b12, b13, b22, b23, b33;
+} adjugate;
+
+/* shift: is taken from the diagonal. */
+static inline adjugate adjugate_of(const quartics *q, int l, double shift) {
+  const double a00 = q->a00[l] - shift, a11 = q->a11[l] - shift, a22 = q->a22[l] - shift, a33 = q->a33[l] - shift;
+  const double a01 = q->a01[l], a02 = q->a02[l], a03 = q->a03[l], a12 = q->a12[l], a13 = q->a13[l], a23 = q->a23[l];
+  const double s0 = a00 * a11 - a01 * a01, s1 = a00 * a12 - a01 * a02, s2 = a00 * a13 - a01 * a03;
+  const double s3 = a01 * a12 - a11 * a02, s4 = a01 * a13 - a11 * a03, s5 = a02 * a13 - a12 * a03;
+  const double c1 = a02 * a23 - a03 * a22, c2 = a02 * a33 - a03 * a23, c3 = a12 * a23 - a13 * a22;
+  const double c4 = a12 * a33 - a13 * a23, c5 = a22 * a33 - a23 * a23;
+  return (adjugate){.b00 = a11 * c5 - a12 * c4 + a13 * c3,
+                    .b01 = -a01 * c5 + a02 * c4 - a03 * c3,
+                    .b02 = a13 * s5 - a23 * s4 + a33 * s3,
+                    .b03 = -a12 * s5 + a22 * s4 - a23 * s3,
+                    .b11 = a00 * c5 - a02 * c2 + a03 * c1,
+                    .b12 = -a03 * s5 + a23 * s2 - a33 * s1,
+                    .b13 = a02 * s5 - a22 * s2 + a23 * s1,
+                    .b22 = a03 * s4 - a13 * s2 + a33 * s0,
+                    .b23 = -a02 * s4 + a12 * s2 - a23 * s0,
+                    .b33 = a02 * s3 - a12 * s1 + a22 * s0};
+}
+
+static inline double larger(double a, double b) {
+  return a > b ? a : b;
+}
+
+/* Scales the matrices to elements up to 1 and fills the quartics. */
+ORB_CLONES static void rotation_quartics(double h[9][ORB_ROTATIONS], quartics *q) {
+  lanes greatest = {0};
+  for (int k = 0; k < 9; k++) {
+    for (int l = 0; l < ORB_ROTATIONS; l++) {
+      greatest[l] = larger(greatest[l], fabs(h[k][l]));
+    }
+  }
+  for (int k = 0; k < 9; k++) {
+    for (int l = 0; l < ORB_ROTATIONS; l++) {
+      h[k][l] /= greatest[l] > 0 ? greatest[l] : 1;
+    }
+  }
+  for (int l = 0; l < ORB_ROTATIONS; l++) {
+    q->a00[l] = h[0][l] + h[4][l] + h[8][l];
+    q->a01[l] = h[7][l] - h[5][l];
+    q->a02[l] = h[2][l] - h[6][l];
+    q->a03[l] = h[3][l] - h[1][l];
+    q->a11[l] = h[0][l] - h[4][l] - h[8][l];
+    q->a12[l] = h[3][l] + h[1][l];
+    q->a13[l] = h[2][l] + h[6][l];
+    q->a22[l] = -h[0][l] + h[4][l] - h[8][l];
+    q->a23[l] = h[7][l] + h[5][l];
+    q->a33[l] = -h[0][l] - h[4][l] + h[8][l];
+    q->squares[l] = h[0][l] * h[0][l] + h[1][l] * h[1][l] + h[2][l] * h[2][l] + h[3][l] * h[3][l] + h[4][l] * h[4][l] +
+                    h[5][l] * h[5][l] + h[6][l] * h[6][l] + h[7][l] * h[7][l] + h[8][l] * h[8][l];
+    q->det[l] = h[0][l] * (h[4][l] * h[8][l] - h[5][l] * h[7][l]) - h[1][l] * (h[3][l] * h[8][l] - h[5][l] * h[6][l]) +
+                h[2][l] * (h[3][l] * h[7][l] - h[4][l] * h[6][l]);
+    const adjugate b = adjugate_of(q, l, 0);
+    q->c0[l] = q->a00[l] * b.b00 + q->a01[l] * b.b01 + q->a02[l] * b.b02 + q->a03[l] * b.b03;
+  }
+}
+
+/* One Newton step to the greatest eigenvalues. Returns whether one goes on. */
+ORB_CLONES static int rotation_newton(const quartics *q, double x[ORB_ROTATIONS]) {
+  int goes_on = 0;
+  for (int l = 0; l < ORB_ROTATIONS; l++) {
+    const double x2 = x[l] * x[l], slope = 4 * x2 * x[l] - 4 * q->squares[l] * x[l] - 8 * q->det[l];
+    const double value = x2 * x2 - 2 * q->squares[l] * x2 - 8 * q->det[l] * x[l] + q->c0[l];
+    const double step = (slope > 0 ? value : 0) / (slope > 0 ? slope : 1);
+    x[l] -= step;
+    goes_on |= step > 1e-15 * x[l];
+  }
+  return goes_on;
+}
+
+/* The rotations, 9 rows of lanes. clear: 0 where one is not clear enough. */
+ORB_CLONES static void rotation_read(const quartics *n, const double value[ORB_ROTATIONS], double r[9][ORB_ROTATIONS],
+                                     double clear[ORB_ROTATIONS]) {
+  for (int l = 0; l < ORB_ROTATIONS; l++) {
+    const adjugate b = adjugate_of(n, l, value[l]);
+    const double d0 = fabs(b.b00), d1 = fabs(b.b11), d2 = fabs(b.b22), d3 = fabs(b.b33);
+    const double low = larger(d0, d1), high = larger(d2, d3), greatest = larger(low, high);
+    const int upper = low >= high, first = d0 >= d1, third = d2 >= d3;
+    const double w = upper ? (first ? b.b00 : b.b01) : (third ? b.b02 : b.b03);
+    const double x = upper ? (first ? b.b01 : b.b11) : (third ? b.b12 : b.b13);
+    const double y = upper ? (first ? b.b02 : b.b12) : (third ? b.b22 : b.b23);
+    const double z = upper ? (first ? b.b03 : b.b13) : (third ? b.b23 : b.b33);
+    const double length = w * w + x * x + y * y + z * z, two = 2 / (length > 0 ? length : 1);
+    clear[l] = greatest > CLEAR * value[l] * value[l] * value[l] ? 1 : 0;
+    r[0][l] = 1 - two * (y * y + z * z);
+    r[1][l] = two * (x * y - w * z);
+    r[2][l] = two * (x * z + w * y);
+    r[3][l] = two * (x * y + w * z);
+    r[4][l] = 1 - two * (x * x + z * z);
+    r[5][l] = two * (y * z - w * x);
+    r[6][l] = two * (x * z - w * y);
+    r[7][l] = two * (y * z + w * x);
+    r[8][l] = 1 - two * (x * x + y * y);
+  }
+}
+
+void orb_nearest_rotations(double h[9][ORB_ROTATIONS], int count, double *r) {
+  quartics q;
+  lanes value, clear;
+  double found[9][ORB_ROTATIONS], one[9];
+  rotation_quartics(h, &q);
+  for (int l = 0; l < ORB_ROTATIONS; l++) {
+    value[l] = sqrt(3 * q.squares[l]);
+  }
+  for (int i = 0; i < STEPS && rotation_newton(&q, value); i++) {
+  }
+  rotation_read(&q, value, found, clear);
+  for (int l = 0; l < count; l++) {
+    for (int k = 0; k < 9; k++) {
+      one[k] = h[k][l];
+    }
+    if (clear[l] > 0) {
+      for (int k = 0; k < 9; k++) {
+        r[9 * l + k] = found[k][l];
+      }
+    } else { /* also where h is not finite */
+      (void)orb_nearest_rotation(one, r + 9 * l);
+    }
+  }
 }

@@ -112,9 +112,8 @@ static void test_svd(void **unused) {
 
 /* The rotation nearest to h has the greatest trace of Rᵀ h: the sum of the singular values, the least of them negated
  * where h mirrors. */
-static void check_rotation(const double h[9]) {
-  double r[9], u[9], s[3], v[9], trace = 0;
-  assert_int_equal(orb_nearest_rotation(h, r), 1);
+static void check_nearest(const double h[9], const double r[9]) {
+  double u[9], s[3], v[9], trace = 0;
   orb_svd3(h, u, s, v);
   const double det =
       h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) + h[2] * (h[3] * h[7] - h[4] * h[6]);
@@ -131,8 +130,29 @@ static void check_rotation(const double h[9]) {
   assert_true(fabs(trace - (s[0] + s[1] + (det < 0 ? -s[2] : s[2]))) <= 1e-13 * (s[0] + 1e-300));
 }
 
+static void check_rotation(const double h[9]) {
+  double r[9];
+  assert_int_equal(orb_nearest_rotation(h, r), 1);
+  check_nearest(h, r);
+}
+
+/* The same, for as many as are given. */
+static void check_rotations(double h[ORB_ROTATIONS][9], int count) {
+  double at_once[9][ORB_ROTATIONS] = {{0}}, r[9 * ORB_ROTATIONS + 1];
+  for (int k = 0; k < 9 * ORB_ROTATIONS; k++) {
+    at_once[k % 9][k / 9] = k / 9 < count ? h[k / 9][k % 9] : 0;
+  }
+  r[9 * count] = 5;
+  orb_nearest_rotations(at_once, count, r);
+  for (int i = 0; i < count; i++) {
+    check_nearest(h[i], r + 9 * i);
+  }
+  assert_true(r[9 * count] == 5);
+}
+
 /* Also for matrices of rank 1 and 2, near a mirror image, and of any size. */
 static void test_rotation(void **unused) {
+  double several[ORB_ROTATIONS][9];
   (void)unused;
   for (int i = 0; i < 20000; i++) {
     double h[9];
@@ -148,12 +168,19 @@ static void test_rotation(void **unused) {
       h[k] *= scale;
     }
     check_rotation(h);
+    memcpy(several[i % ORB_ROTATIONS], h, sizeof h);
+    if (i % ORB_ROTATIONS == i / ORB_ROTATIONS % ORB_ROTATIONS) { /* the last ones are those of the group before */
+      check_rotations(several, i < ORB_ROTATIONS ? i + 1 : i % ORB_ROTATIONS + 1);
+    }
   }
   double r[9];
   check_rotation((const double[9]){0});
   check_rotation((const double[9]){1, 0, 0, 0, 1, 0, 0, 0, -1});
   check_rotation((const double[9]){-1, 0, 0, 0, -1, 0, 0, 0, -1});
   assert_int_equal(orb_nearest_rotation((const double[9]){NAN}, r), 0);
+  double broken[9][ORB_ROTATIONS] = {{NAN, INFINITY}, {0}}, kept[18] = {1, [9] = 2};
+  orb_nearest_rotations(broken, 2, kept);
+  assert_true(kept[0] == 1 && kept[9] == 2 && kept[8] == 0 && kept[17] == 0);
 }
 
 int main(void) {
