@@ -345,9 +345,56 @@ static void test_paths(void **unused) {
   drop(&s);
 }
 
+/* A surface that was moved to other points on the sphere reads as one that was made there: the points turn by a quarter
+ * around an axis, so what reads them must turn too. */
+static void test_moved_surface(void **unused) {
+  scene s;
+  (void)unused;
+  make(&s, ORB_CPU_AUTO, 1, globe, 0.1);
+  const size_t n = 3 * (size_t)s.fixed.vertex_count, m = (size_t)s.fixed.triangle_count;
+  double *turned = malloc(n * sizeof *turned), *density = malloc(m * sizeof *density);
+  assert_true(turned && density);
+  memcpy(density, s.packed.b.density, m * sizeof *density);
+  for (size_t i = 0; i < n; i += 3) {
+    const double p[3] = {-s.fixed_points[i + 1], s.fixed_points[i], s.fixed_points[i + 2]};
+    memcpy(turned + i, p, sizeof p);
+  }
+  assert_int_equal(orb_map_surface_move(s.ctx, &s.surface, turned), ORB_OK);
+  orb_map_packed_move(&s.surface, &s.packed);
+  for (int32_t t = 0; t < s.fixed.triangle_count; t++) {
+    const orb_place place = {.triangle = t, .at = {0.25, 0.5, 0.25}}, packed = {s.packed.to[t], {0.25, 0.5, 0.25}};
+    double x[3], y[3], was[3], sum = 0;
+    orb_place found;
+    for (int k = 0; k < 3; k++) { /* by the file's own points, turned */
+      was[k] = 0;
+      for (int c = 0; c < 3; c++) {
+        was[k] += place.at[c] * turned[3 * (size_t)s.fixed.triangles[3 * t + c] + (size_t)k];
+      }
+      sum += was[k] * was[k];
+    }
+    orb_map_surface_at(&s.surface, &place, NULL, x, NULL);
+    orb_map_surface_at(&s.packed.b, &packed, NULL, y, NULL);
+    for (int k = 0; k < 3; k++) {
+      assert_true(fabs(x[k] - was[k] / sqrt(sum)) < 1e-14);
+      assert_true(x[k] == y[k]);
+    }
+    orb_locate(s.surface.locator, x, -1, &found);
+    assert_int_equal(found.triangle, t);
+    assert_true(fabs(s.packed.b.density[s.packed.to[t]] - density[s.packed.to[t]]) < 1e-12 * density[s.packed.to[t]]);
+    assert_true(s.packed.triangle_row[ORB_MAP_ROW * (size_t)s.packed.to[t] + 10] == s.surface.density[t]);
+  }
+  for (int32_t v = 0; v < s.fixed.vertex_count; v++) {
+    const double *row = s.packed.vertex_row + ORB_MAP_ROW * (size_t)v;
+    assert_memory_equal(row + 3, turned + 3 * (size_t)s.packed.vertex[v], sizeof(double[3]));
+  }
+  free(turned);
+  free(density);
+  drop(&s);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_as_single), cmocka_unit_test(test_parts),
-                                     cmocka_unit_test(test_same_for_threads), cmocka_unit_test(test_large_star),
-                                     cmocka_unit_test(test_paths)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_same_as_single), cmocka_unit_test(test_parts), cmocka_unit_test(test_same_for_threads),
+      cmocka_unit_test(test_large_star),     cmocka_unit_test(test_paths), cmocka_unit_test(test_moved_surface)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
