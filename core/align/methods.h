@@ -28,6 +28,7 @@
 
 #include "align/map/compose.h"
 #include "align/sheet/copies.h"
+#include "base/tasks.h"
 
 /* Working copies with the landmarks as vertices, aligned by options->method and certified; no map is composed. */
 ORB_MUST_CHECK orb_status orb_align_by_method(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -70,12 +71,17 @@ typedef struct orb_aims {
   orb_map_aim aim;              /* of two shapes: see orb_map_guide */
   int keep_angles;              /* the spheres of the shapes do */
   orb_map_beat beat;            /* see orb_map_guide */
-  orb_map_course *course;       /* see orb_map_guide; that of the last shape */
+  orb_map_course *course;       /* of two shapes: see orb_map_guide */
   int walks_first, walks_early; /* see orb_map_guide */
 } orb_aims;
 
-/* Improves the maps from the first shape to the others (orb_compose()), side by side, since aligned landmarks alone do
- * not make a good morph. Fills alignment->energy. aims: NULL for none. */
+/* Runs tasks that each make the map of a further shape to the first one (base/tasks.h): side by side if the first one
+ * is small, else one after the other, since each map has a copy of it, and loops over a large shape use all threads. */
+ORB_MUST_CHECK orb_status orb_align_each(orb_context *ctx, const orb_aligned_shape *first, orb_preset preset,
+                                         int32_t count, orb_task_fn task, void *arg);
+
+/* Improves the maps from the first shape to the others (orb_compose()), with orb_align_each(), since aligned landmarks
+ * alone do not make a good morph. Fills alignment->energy. aims: NULL for none. */
 ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,
                                           const orb_aims *aims, orb_preset preset);
 

@@ -68,7 +68,7 @@ orb_status orb_context_part(orb_context *ctx, orb_context **out) {
     return ORB_E_NO_MEMORY;
   }
   begin(part, ctx->root, &ctx->root->options);
-  part->options.threads = 1;
+  part->options.threads = 1; /* it starts none; others enter its pool */
   memcpy(part->hash_key, ctx->hash_key, sizeof part->hash_key);
   *out = part;
   return ORB_OK;

@@ -61,7 +61,8 @@ typedef struct parallel_loop {
 struct orb_pool {
   pthread_mutex_t lock;
   pthread_cond_t wake, done;
-  int own, stopping;   /* workers that the pool has started */
+  int own; /* workers that the pool has started */
+  int stopping;
   int guests;          /* workers that have entered and not left; under the lock */
   atomic_int workers;  /* own ones and guests that have entered: each has a number, from 1 on */
   int spins;           /* of the caller, before it sleeps */
@@ -400,10 +401,11 @@ static void run_shared(struct orb_pool *pool, const parallel_loop *loop, uint32_
   }
   if (own > 0) {
     learn(cost, (orb_clock() - start) / (double)(own * loop->grain));
-  } else { /* others were quicker: so short is the loop */
-    learn(cost, (orb_clock() - start) / (double)loop->count);
   }
   await(pool, loop->chunks - first - own);
+  if (own == 0) { /* others were quicker; elsewhere loops of a body that is always this short would never be known */
+    learn(cost, (orb_clock() - start) / (double)(loop->count - first * loop->grain));
+  }
   for (int i = 0; i < atomic_load(&pool->ranges); i++) {
     atomic_store(&pool->range[i].ticket, (unsigned long long)newest_loop(pool) << 32 | (uint32_t)CLOSED);
   }

@@ -18,20 +18,23 @@ void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t 
 /* The same over [0, count) in chunks of one, each of which is worth a thread. */
 void orb_parallel_each(orb_context *ctx, int64_t count, orb_loop_fn body, void *arg);
 
-/* Threads that take part in loops of the context now: its own ones, and those that help. */
+/* Threads that take part in loops of the context now: its own ones, and those that help. Before its first loop: as many
+ * as it will start. */
 int orb_pool_threads(const orb_context *ctx);
 
-/* A context whose loops other threads may help with (tasks.h). Opens its pool, before its first loop. */
+/* Opens the pool of a part (context.h), before its first loop, so that other threads may help with its loops. Without
+ * memory the part has none. */
 void orb_pool_open(orb_context *ctx);
 
-/* Enters the pool of a context as a thread of its loops, while it cannot stop. Returns the number of the thread, or 0:
+/* Enters the pool of a context as a thread of its loops. The caller makes sure that the pool does not stop before this
+ * returns, and then calls orb_pool_help(): the pool waits for it when it stops. Returns the number of the thread, or 0:
  * there are orb_threads() already, or there is no pool. */
 int orb_pool_enter(orb_context *ctx);
 
-/* Helps with the loops of the context as this thread until its pool stops. */
+/* Helps with the loops of the context as the thread of this number, until the pool stops. */
 void orb_pool_help(orb_context *ctx, int index);
 
-/* Waits until helpers have left, joins the threads and frees the pool. Does nothing where no parallel loop has run. */
+/* Waits until helpers have left, joins the threads and frees the pool. Does nothing without a pool. */
 void orb_pool_stop(orb_context *ctx);
 
 #endif

@@ -18,7 +18,7 @@ struct orb_context {
   int in_loop; /* set by orb_parallel_for() around a loop: the first failure wins */
   pthread_mutex_t progress_lock;
   const char *stage;     /* the only stage that is reported; NULL: any */
-  struct orb_pool *pool; /* created by the first parallel loop */
+  struct orb_pool *pool; /* created by the first parallel loop, or by orb_pool_open() */
   uint64_t hash_key[2];  /* of orb_hash() */
 };
 

@@ -1,5 +1,5 @@
-/* Each thread begins tasks as long as there are any. Then it helps with the loops of tasks that still run, of the one
- * with the fewest helpers first, until that ends. So no thread is idle while a task has a loop to share. */
+/* Each thread begins tasks as long as there are any. Then it helps with the loops of a task that still runs, the one
+ * with the fewest helpers, until that ends, and then with another one. */
 #include "base/tasks.h"
 
 #include <string.h>
@@ -54,7 +54,8 @@ static void end_task(tasks *t, one_task *one) {
   pthread_mutex_unlock(&t->lock);
 }
 
-/* A part lives as long as its task, since it takes 1.5 MB of the budget. */
+/* A part lives as long as its task, since it takes 1.5 MB of the budget; that of a task that fails, until all have
+ * ended. */
 static void run_task(tasks *t, int32_t i) {
   one_task *one = &t->one[i];
   orb_context *part = NULL;

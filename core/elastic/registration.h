@@ -29,7 +29,7 @@ typedef struct orb_registration {
   const orb_relief *relief; /* of a and b; NULL: not known */
   double noise;             /* of the relief, at the places as they are */
   double *ahead, *last;     /* of a slide: where it looks, and where it was in the last round; NULL: none */
-  int is_alone;             /* no other registration runs beside this one: its loops run on all threads */
+  int is_alone; /* its loops are shared with the threads that are free: it is not one of many that run side by side */
 } orb_registration;
 
 /* Room for mesh a to be registered to mesh b. The other members of *r are the caller's, from before. Free it in any

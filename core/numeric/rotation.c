@@ -193,10 +193,10 @@ ORB_CLONES static int rotation_newton(const quartics *q, double x[ORB_ROTATIONS]
 }
 
 /* The rotations, 9 rows of lanes. clear: 0 where one is not clear enough. */
-ORB_CLONES static void rotation_read(const quartics *n, const double value[ORB_ROTATIONS], double r[9][ORB_ROTATIONS],
+ORB_CLONES static void rotation_read(const quartics *q, const double value[ORB_ROTATIONS], double r[9][ORB_ROTATIONS],
                                      double clear[ORB_ROTATIONS]) {
   for (int l = 0; l < ORB_ROTATIONS; l++) {
-    const adjugate b = adjugate_of(n, l, value[l]);
+    const adjugate b = adjugate_of(q, l, value[l]);
     const double d0 = fabs(b.b00), d1 = fabs(b.b11), d2 = fabs(b.b22), d3 = fabs(b.b33);
     const double low = larger(d0, d1), high = larger(d2, d3), greatest = larger(low, high);
     const int upper = low >= high, first = d0 >= d1, third = d2 >= d3;

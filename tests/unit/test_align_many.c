@@ -50,10 +50,12 @@ static void turn(int s, const double p[3], double out[3]) {
   orb_normalize(out);
 }
 
-static void crowd_open(crowd *c, int count) {
+/* threads: 0: one per processor. */
+static void crowd_open_on(crowd *c, int count, int threads) {
+  const orb_context_options options = {.threads = threads};
   memset(c, 0, sizeof *c);
   c->count = count;
-  assert_int_equal(orb_context_create(NULL, &c->ctx), ORB_OK);
+  assert_int_equal(orb_context_create(&options, &c->ctx), ORB_OK);
   for (int s = 0; s < count; s++) {
     c->mesh[s] = shape_globe(c->ctx, 18 + s % 5 * 2, 14 + s % 7);
     size_t size = 3 * (size_t)c->mesh[s].vertex_count;
@@ -69,6 +71,10 @@ static void crowd_open(crowd *c, int count) {
     }
     c->shape[s] = (orb_align_shape){&c->mesh[s], c->points[s]};
   }
+}
+
+static void crowd_open(crowd *c, int count) {
+  crowd_open_on(c, count, 0);
 }
 
 static void crowd_close(crowd *c) {
@@ -141,6 +147,41 @@ static void few_landmarks(void **state) {
   crowd_close(&c);
 }
 
+/* Maps of several shapes are made side by side. However many threads there are, all points are the same bytes. */
+static void same_for_any_threads(void **state) {
+  static const double axis[MARKS][3] = {{0.6, 0.64, 0.48}, {-0.6, -0.64, -0.48}, {0.8, -0.6, 0}, {-0.8, 0.6, 0},
+                                        {0, 0.6, -0.8},    {0.28, 0, 0.96},      {0, -1, 0},     {-0.6, 0, 0.8}};
+  static const struct {
+    orb_align_method method;
+    int marks;
+  } tried[] = {{ORB_ALIGN_AUTO, 0}, {ORB_ALIGN_PIN, 3}, {ORB_ALIGN_PIN, MARKS}};
+  static const int threads[] = {1, 2, 5};
+  (void)state;
+  for (size_t i = 0; i < sizeof tried / sizeof *tried; i++) {
+    orb_alignment out[3];
+    crowd c[3];
+    for (int t = 0; t < 3; t++) {
+      crowd_open_on(&c[t], 4, threads[t]);
+      for (int k = 0; k < tried[i].marks; k++) {
+        mark(&c[t], k, axis[k]);
+      }
+      orb_align_options options = bodies_options(tried[i].method);
+      options.preset = ORB_PRESET_DEFAULT;
+      align_and_check(c[t].ctx, c[t].shape, 4, c[t].landmark, tried[i].marks, &options, &out[t]);
+      assert_true(out[t].energy == out[0].energy);
+      for (int s = 0; s < 4; s++) {
+        assert_int_equal(out[t].shapes[s].mesh.vertex_count, out[0].shapes[s].mesh.vertex_count);
+        assert_memory_equal(out[t].shapes[s].points, out[0].shapes[s].points,
+                            3 * (size_t)out[0].shapes[s].mesh.vertex_count * sizeof(double));
+      }
+    }
+    for (int t = 0; t < 3; t++) {
+      orb_alignment_free(c[t].ctx, &out[t]);
+      crowd_close(&c[t]);
+    }
+  }
+}
+
 /* The landmarks are equal directions of equal surfaces, so the maps are nearly the identity. */
 static void many_shapes(void **state) {
   (void)state;
@@ -161,6 +202,7 @@ static void many_shapes(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(few_landmarks), cmocka_unit_test(many_shapes)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(few_landmarks), cmocka_unit_test(many_shapes),
+                                     cmocka_unit_test(same_for_any_threads)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

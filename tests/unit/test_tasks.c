@@ -5,6 +5,7 @@
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
@@ -221,10 +222,88 @@ static void idle_threads_help(void **unused) {
   }
 }
 
+typedef struct nested {
+  helped help;
+  work inner;
+} nested;
+
+/* As wait_for_help(), and then tasks within the task, which the helper takes part in. */
+static orb_status work_when_helped(orb_context *ctx, void *arg, int32_t task) {
+  nested *n = arg;
+  if (task == 0) {
+    return ORB_OK;
+  }
+  const orb_status status = wait_for_help(ctx, &n->help, task);
+  return status == ORB_OK ? do_work(ctx, &n->inner, 0) : status;
+}
+
+static void helpers_take_inner_tasks(void **unused) {
+  (void)unused;
+  for (size_t t = 0; t < sizeof threads_tried / sizeof *threads_tried; t++) {
+    static nested n;
+    memset(&n, 0, sizeof n);
+    n.help.threads = threads_tried[t];
+    if (n.help.threads == 1) {
+      continue;
+    }
+    orb_context *ctx = context_of(n.help.threads, 0);
+    assert_int_equal(orb_tasks_run(ctx, 2, work_when_helped, &n), ORB_OK);
+    assert_true(n.help.is_helped);
+    assert_int_equal(n.inner.sum[0] + n.inner.sum[1] + n.inner.sum[2],
+                     (int64_t)(MOST - 1) * MOST * (2 * MOST - 1) / 6); /* of the squares below MOST */
+    orb_context_destroy(ctx);
+  }
+}
+
+/* Fails the n-th allocation and all after it. */
+typedef struct failing {
+  atomic_int left, blocks;
+} failing;
+
+static void *fail_alloc(void *user, size_t size) {
+  failing *f = user;
+  void *block = atomic_fetch_sub(&f->left, 1) > 0 ? malloc(size) : NULL;
+  atomic_fetch_add(&f->blocks, block != NULL);
+  return block;
+}
+
+static void fail_free(void *user, void *block) {
+  failing *f = user;
+  atomic_fetch_sub(&f->blocks, block != NULL);
+  free(block);
+}
+
+/* Without memory for a part, or for its pool, tasks fail or run without help, and nothing is lost. */
+static void no_memory_is_told(void **unused) {
+  static work all[TASKS];
+  int has_failed = 0, has_worked = 0;
+  (void)unused;
+  for (int n = 1; n < 200 && !has_worked; n++) {
+    failing f = {n, 0};
+    const orb_context_options options = {.threads = 3, .allocator = {fail_alloc, fail_free, &f}};
+    orb_context *ctx;
+    if (orb_context_create(&options, &ctx) != ORB_OK) {
+      continue;
+    }
+    memset(all, 0, sizeof all);
+    const orb_status status = orb_tasks_run(ctx, TASKS, do_work, all);
+    assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
+    has_failed += status == ORB_E_NO_MEMORY;
+    has_worked = status == ORB_OK && atomic_load(&f.left) > 0;
+    for (int i = 0; status == ORB_OK && i < TASKS; i++) {
+      assert_int_equal(atomic_load(&all[i].times), 1);
+    }
+    orb_context_destroy(ctx);
+    assert_int_equal(atomic_load(&f.blocks), 0);
+  }
+  assert_true(has_failed > 0 && has_worked);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(each_task_once),          cmocka_unit_test(first_failure_is_told),
-      cmocka_unit_test(budget_is_shared),        cmocka_unit_test(cancelling_reaches_all),
-      cmocka_unit_test(progress_is_the_callers), cmocka_unit_test(idle_threads_help)};
+      cmocka_unit_test(each_task_once),           cmocka_unit_test(first_failure_is_told),
+      cmocka_unit_test(budget_is_shared),         cmocka_unit_test(cancelling_reaches_all),
+      cmocka_unit_test(progress_is_the_callers),  cmocka_unit_test(idle_threads_help),
+      cmocka_unit_test(helpers_take_inner_tasks), cmocka_unit_test(no_memory_is_told)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

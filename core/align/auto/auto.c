@@ -39,7 +39,6 @@ typedef struct matches {
   double bend;            /* most over the shapes */
   int are_found;          /* all of them */
   int keep_angles;        /* the spheres of the shapes do */
-  int32_t moving_count;   /* vertices of the second shape */
 } matches;
 
 static void matches_free(orb_context *ctx, matches *m) {
@@ -71,12 +70,7 @@ static void gather(matches *m) {
 
 static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, int keep_angles,
                                matches *m) {
-  *m = (matches){.shape_count = shape_count,
-                 .clear = 1,
-                 .lead = INFINITY,
-                 .are_found = 1,
-                 .keep_angles = keep_angles,
-                 .moving_count = shapes[shape_count - 1].mesh->vertex_count};
+  *m = (matches){.shape_count = shape_count, .clear = 1, .lead = INFINITY, .are_found = 1, .keep_angles = keep_angles};
   m->of = ORB_NEW0(ctx, orb_match, shape_count);
   m->targets = ORB_NEW0(ctx, const double *, shape_count);
   m->vertex = ORB_NEW(ctx, int32_t, ORB_MATCH_PAIRS * (size_t)shape_count);
@@ -223,21 +217,13 @@ static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_opt
   return won.is_second ? choose_other(ctx, m, 0, NULL, won.clear) : ORB_OK;
 }
 
-/* Fills the target of the match of two shapes, for which there is room. */
 static orb_status fill_target(orb_context *ctx, void *user) {
-  matches *m = user;
-  double *target;
-  const orb_status status = orb_match_target(ctx, &m->of[1], 0, 1, &target);
-  if (status == ORB_OK) {
-    memcpy(m->of[1].target, target, 3 * (size_t)m->moving_count * sizeof *target);
-  }
-  orb_free(ctx, target);
-  return status;
+  return orb_match_fill_target(ctx, user);
 }
 
 /* Makes room for the target of the match of two shapes. */
-static orb_status reserve_target(orb_context *ctx, matches *m) {
-  m->of[1].target = ORB_NEW(ctx, double, 3 * (size_t)m->moving_count);
+static orb_status reserve_target(orb_context *ctx, const orb_mesh *second, matches *m) {
+  m->of[1].target = ORB_NEW(ctx, double, 3 * (size_t)second->vertex_count);
   m->targets[1] = m->of[1].target;
   return m->targets[1] ? ORB_OK : ORB_E_NO_MEMORY;
 }
@@ -294,9 +280,9 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   orb_status status;
   orb_map_course course = {0};
   const int is_pair = m->shape_count == 2 && m->of[1].is_found;
-  ORB_TRY(is_pair ? reserve_target(ctx, m) : aim(ctx, m));
+  ORB_TRY(is_pair ? reserve_target(ctx, shapes[1].mesh, m) : aim(ctx, m));
   const orb_aims aims = {.targets = m->targets,
-                         .aim = {is_pair ? fill_target : NULL, m},
+                         .aim = {is_pair ? fill_target : NULL, &m->of[1]},
                          .keep_angles = m->keep_angles,
                          .course = m->shape_count == 2 ? &course : NULL, /* only pairs have a next match */
                          .walks_first = m->bend > ORB_FIND_WALKS_FIRST,

@@ -286,6 +286,17 @@ orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n,
   return one->cost < INFINITY ? write_targets(ctx, t, one, moving, target) : ORB_OK;
 }
 
+orb_status orb_match_fill_target(orb_context *ctx, const orb_match *match) {
+  double *target;
+  orb_status status = orb_match_target(ctx, match, 0, 1, &target);
+  if (status == ORB_OK) {
+    ORB_ASSERT(target && match->target); /* the best map has its way back */
+    memcpy(match->target, target, 3 * (size_t)match->trials->mesh[1]->vertex_count * sizeof *target);
+  }
+  orb_free(ctx, target);
+  return status;
+}
+
 orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear) {
   orb_trials *t = match->trials;
   const int32_t chosen = t->list[1 + k];

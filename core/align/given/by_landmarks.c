@@ -1,6 +1,7 @@
 /* Alignment by landmarks. Two ways compete: pins (pin/), and a match in which all limbs lie where one body in two poses
  * has them (find/match.c), which the landmarks only draw. Whichever leads to the better map wins. */
 #include <math.h>
+#include <stdatomic.h>
 #include <string.h>
 
 #include "align/find/match.h"
@@ -12,7 +13,6 @@
 #include "align/sheet/sheet.h"
 #include "base/check.h"
 #include "base/memory.h"
-#include "base/tasks.h"
 #include "numeric/vec3.h"
 
 /* Orders the landmarks so that each is as far as possible from those before it, on the first shape. vertex: theirs on
@@ -119,22 +119,8 @@ static orb_status ask_pins(void *user, double energy, int *goes_on) {
   return ORB_OK;
 }
 
-/* A match of which the target is not yet computed. */
-typedef struct aiming {
-  const orb_match *match; /* with room for it */
-  int32_t count;          /* vertices of the second shape */
-} aiming;
-
-/* Fills where the best map of a match takes the second shape. */
 static orb_status fill_target(orb_context *ctx, void *user) {
-  const aiming *one = user;
-  double *found;
-  orb_status status = orb_match_target(ctx, one->match, 0, 1, &found);
-  if (status == ORB_OK) {
-    memcpy(one->match->target, found, 3 * (size_t)one->count * sizeof *found);
-  }
-  orb_free(ctx, found);
-  return status;
+  return orb_match_fill_target(ctx, user);
 }
 
 /* What the pose of one shape has led to. Without a match, or without a map, the energies are INFINITY. */
@@ -143,19 +129,19 @@ typedef struct posed_map {
   int is_unsure;
 } posed_map;
 
-/* Shapes that are composed side by side. */
+/* Shapes that are composed side by side. If one has no map, those after it do not count, and are left out. */
 typedef struct posing {
   two_ways *ways;
   double sure; /* that of the hint */
   int keeps_angles;
-  posed_map *map; /* of each shape but the first */
+  posed_map *map;         /* of each shape but the first */
+  atomic_int first_empty; /* the first of them so far that has none; their number: all have one */
 } posing;
 
 /* Composes the map to a shape towards a match that agrees with a few landmarks and that all of them draw to their
  * partners, with all of them pinned. Soft landmarks exclude matches only if too few are exact. Several shapes share
  * nothing that they write: only two shapes have pins. */
-static orb_status compose_posed(orb_context *ctx, void *arg, int32_t i) {
-  const posing *all = arg;
+static orb_status compose_posed(orb_context *ctx, const posing *all, int32_t i) {
   two_ways *c = all->ways;
   const int32_t s = i + 1;
   posed_map *out = &all->map[i];
@@ -191,11 +177,10 @@ static orb_status compose_posed(orb_context *ctx, void *arg, int32_t i) {
       status = ORB_E_NO_MEMORY;
       goto done;
     }
-    aiming one = {&match, moving->mesh.vertex_count};
     const int walks_first = competes && match.bend > ORB_FIND_WALKS_FIRST;
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE,
                                  .target = match.target,
-                                 .aim = {fill_target, &one},
+                                 .aim = {fill_target, &match},
                                  .fits_parts = 1,
                                  .keeps_angles = all->keeps_angles,
                                  .course = &course,
@@ -213,14 +198,29 @@ done:
   return status;
 }
 
+static orb_status compose_unless_empty(orb_context *ctx, void *arg, int32_t i) {
+  posing *all = arg;
+  if (atomic_load(&all->first_empty) < i) {
+    return ORB_OK;
+  }
+  orb_status status = compose_posed(ctx, all, i);
+  int first = atomic_load(&all->first_empty);
+  while (status == ORB_OK && !(all->map[i].loose < INFINITY) && i < first &&
+         !atomic_compare_exchange_weak(&all->first_empty, &first, i)) {
+  }
+  return first < i ? ORB_OK : status;
+}
+
 /* Composes the maps to all shapes but the first. */
 static orb_status compose_to_all(two_ways *c, double sure, int keeps_angles) {
   posed *p = &c->posed;
   const int32_t count = c->shape_count - 1;
-  posing all = {c, sure, keeps_angles, ORB_NEW0(c->ctx, posed_map, count)};
-  orb_status status = all.map ? orb_tasks_run(c->ctx, count, compose_posed, &all) : ORB_E_NO_MEMORY;
+  posing all = {c, sure, keeps_angles, ORB_NEW0(c->ctx, posed_map, count), count};
+  orb_status status =
+      all.map ? orb_align_each(c->ctx, &p->alignment.shapes[0], c->options->preset, count, compose_unless_empty, &all)
+              : ORB_E_NO_MEMORY;
   p->alignment.energy = 0;
-  for (int32_t i = 0; i < count && status == ORB_OK; i++) {
+  for (int32_t i = 0; i < count && i <= atomic_load(&all.first_empty) && status == ORB_OK; i++) {
     p->alignment.energy += all.map[i].energy / count;
     p->loose += all.map[i].loose / count;
     p->worst = fmax(p->worst, all.map[i].loose);

@@ -10,7 +10,6 @@
 #include "align/sheet/sheet.h"
 #include "base/check.h"
 #include "base/memory.h"
-#include "base/tasks.h"
 
 static orb_status springs_create(orb_context *ctx, int32_t count, orb_map_springs *out) {
   *out = (orb_map_springs){.moving = ORB_NEW(ctx, int32_t, count),
@@ -168,46 +167,26 @@ static orb_status lift_held(orb_context *ctx, orb_copies *copies, const orb_alig
   return ORB_OK;
 }
 
-/* Shapes that are lifted side by side. */
-typedef struct lifting {
-  orb_copies *copies;
-  const orb_landmark *landmarks;
-  orb_preset preset;
-  orb_alignment *alignment;
-  double *energy; /* of each */
-} lifting;
-
-static orb_status lift_one(orb_context *ctx, void *arg, int32_t i) {
-  const lifting *all = arg;
-  const int32_t s = i + 1;
-  return lift_shape(ctx, &all->copies->of[s], all->landmarks, s, all->preset, all->alignment, &all->energy[i]);
-}
-
 orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, orb_preset preset,
                           orb_alignment *alignment, int *lifted) {
   const orb_landmark none_soft[ORB_FIND_INSET_PAIRS] = {0};
-  const int32_t count = alignment->shape_count - 1;
-  double sum = 0, *energy = ORB_NEW(ctx, double, count);
-  orb_status status = energy ? ORB_OK : ORB_E_NO_MEMORY;
+  double sum = 0;
+  orb_status status;
   *lifted = 0;
-  if (status != ORB_OK) {
-    goto end;
-  }
   ORB_GO(status, lift_alternatives(ctx, copies, alignment), end);
   if (alignment->match.is_part) {
     landmarks = none_soft;
     ORB_GO(status, lift_held(ctx, copies, alignment), end);
   }
-  lifting all = {copies, landmarks, preset, alignment, energy};
-  ORB_GO(status, orb_tasks_run(ctx, count, lift_one, &all), end);
-  for (int32_t i = 0; i < count; i++) {
-    sum += energy[i];
+  for (int32_t s = 1; s < alignment->shape_count && sum < INFINITY; s++) {
+    double energy = INFINITY;
+    ORB_GO(status, lift_shape(ctx, &copies->of[s], landmarks, s, preset, alignment, &energy), end);
+    sum += energy;
   }
   free_landmarks(landmarks, alignment->landmark_count, &alignment->shapes[0]);
-  alignment->energy = sum / count;
+  alignment->energy = sum / (alignment->shape_count - 1);
   *lifted = sum < INFINITY;
 end:
-  orb_free(ctx, energy);
   if (!*lifted) {
     orb_alignment_free(ctx, alignment);
   }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "align/find/params.h"
+#include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "align/pin/pin.h"
 #include "align/rbf/rbf.h"
@@ -87,6 +88,17 @@ end:
   return status;
 }
 
+orb_status orb_align_each(orb_context *ctx, const orb_aligned_shape *first, orb_preset preset, int32_t count,
+                          orb_task_fn task, void *arg) {
+  if (first->mesh.vertex_count <= orb_map_params_of(preset).copies.large) {
+    return orb_tasks_run(ctx, count, task, arg);
+  }
+  for (int32_t i = 0; i < count; i++) {
+    ORB_TRY(task(ctx, arg, i));
+  }
+  return ORB_OK;
+}
+
 /* The maps of several shapes to the first one. Each changes its own shape only, unless there are two shapes. */
 typedef struct composing {
   orb_alignment *alignment;
@@ -124,7 +136,8 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
   const orb_aims none = {0};
   const int32_t count = alignment->shape_count - 1;
   composing all = {alignment, from, aims ? aims : &none, preset, ORB_NEW(ctx, double, count)};
-  orb_status status = all.energy ? orb_tasks_run(ctx, count, compose_one, &all) : ORB_E_NO_MEMORY;
+  orb_status status =
+      all.energy ? orb_align_each(ctx, &alignment->shapes[0], preset, count, compose_one, &all) : ORB_E_NO_MEMORY;
   double sum = 0;
   for (int32_t i = 0; i < count && status == ORB_OK; i++) {
     sum += all.energy[i];

@@ -245,14 +245,14 @@ static orb_status choose_moving(orb_context *ctx, const orb_map_params *params, 
 }
 
 /* A run that is opened while its target is filled. */
-typedef struct opening {
+typedef struct aimed_opening {
   orb_map_run *run;
   const orb_map_guide *guide;
   double *energy;
-} opening;
+} aimed_opening;
 
 static orb_status open_or_aim(orb_context *ctx, void *arg, int32_t task) {
-  const opening *o = arg;
+  const aimed_opening *o = arg;
   if (task == 1) {
     return o->guide->aim.fill(ctx, o->guide->aim.user);
   }
@@ -265,7 +265,7 @@ static orb_status open_or_aim(orb_context *ctx, void *arg, int32_t task) {
 }
 
 static orb_status open_run(orb_map_run *c, const orb_map_guide *guide, double energy[2]) {
-  opening o = {c, guide, energy};
+  aimed_opening o = {c, guide, energy};
   return guide->aim.fill ? orb_tasks_run(c->ctx, 2, open_or_aim, &o) : orb_map_run_open(c, guide, energy);
 }
 

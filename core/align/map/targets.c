@@ -121,7 +121,7 @@ orb_status orb_map_target_walks(orb_map_run *c, orb_map_walked *out) {
 }
 
 /* From walks that the targets guide: the best of them is refined if it comes near the best map so far or below, and
- * below what the caller knows. Refined, it often has less energy. If it leads to no better map, other starts follow. */
+ * below what the caller knows. Refined, it often has less energy. */
 static orb_status start_guided(orb_map_run *c) {
   const double before = c->best_energy;
   orb_map_walked best = {.energy = INFINITY};
@@ -138,7 +138,7 @@ static orb_status start_guided(orb_map_run *c) {
     allow(c);
     ORB_GO(status, orb_map_walked_refine(c, &best), done);
   }
-  if (!(c->best_energy < before)) {
+  if (!(c->best_energy < before) && !(c->walks_first && c->beat.energy > 0)) { /* other starts follow */
     status = orb_map_levels_prepare(c);
   }
 done:

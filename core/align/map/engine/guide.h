@@ -58,7 +58,8 @@ typedef struct orb_map_rival {
   void *user;
 } orb_map_rival;
 
-/* Fills the target of a guide while the run opens, which takes as long. */
+/* Fills the target of a guide while the run opens: both take about as long. It runs once, on a context of its own, and
+ * writes nothing but the target. Only orb_compose() asks for it. */
 typedef struct orb_map_aim {
   orb_status (*fill)(orb_context *ctx, void *user); /* NULL: it is filled already */
   void *user;

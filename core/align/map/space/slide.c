@@ -9,15 +9,15 @@
 
 #include "align/map/space/drawn.h"
 #include "base/check.h"
+#include "base/loops.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "elastic/slide.h"
 #include "numeric/vec3.h"
 
-enum { GRAIN = 128 }; /* vertices of one task */
+enum { SLICE = 8192, GRAIN = 128 }; /* vertices between checks for cancellation, and of one task */
 
 /* Both shapes of a slide, in the order in which sweeps read them: near vertices are near in memory. In the order of a
- * file, threads read what the other ones have just written, and a slide takes as long on two as on one. */
+ * file, threads read what the other ones have just written, and a slide takes as long on two threads as on one. */
 typedef struct slide_shapes {
   orb_mesh a, b;               /* a: the level, whose positions are its own; b: the packed fixed shape */
   double *position;            /* where a's vertices lie: 3 each */
@@ -92,7 +92,7 @@ static orb_status slide_targets(orb_map_run *c, const orb_corner_table *s, const
   ORB_GO(status, orb_nearest_create(ctx, b->positions, b->triangles, b->triangle_count, &p.tree), done);
   memset(c->doubted, ORB_MAP_TRUSTED, (size_t)c->vertex_count);
   p.position = shapes.position;
-  orb_parallel_for(ctx, l->count, GRAIN, project_range, &p);
+  status = orb_sliced_by(ctx, l->count, SLICE, GRAIN, project_range, &p);
 done:
   orb_nearest_destroy(ctx, p.tree);
   slide_shapes_free(ctx, &shapes);
