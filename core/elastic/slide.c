@@ -4,7 +4,10 @@
  * A place is where the vertex is already, except for its distance from the surface, so a pull moves it along the
  * surface by little in each round. What else moves it along the surface is the relief (relief.h): normals of a limb
  * hardly tell how far along the limb and around it a vertex belongs, but its muscles do. A limb that begins far away
- * takes more rounds than others, so a slide goes on while it moves. */
+ * takes more rounds than others, so a slide goes on while it moves.
+ *
+ * Rejected: most rounds on copies of 2,000 vertices, and the last two on the meshes. On 54 pairs with 8 landmarks that
+ * takes 3 % less time, and places are 2 % farther from the truth. */
 #include "elastic/slide.h"
 
 #include <math.h>
