@@ -406,7 +406,7 @@ static void run_shared(struct orb_pool *pool, const parallel_loop *loop, uint32_
     learn(cost, (orb_clock() - start) / (double)(own * loop->grain));
   }
   await(pool, loop->chunks - first - own);
-  if (own == 0) { /* others were quicker; elsewhere loops of a body that is always this short would never be known */
+  if (own == 0) { /* others were quicker; else the cost of a body whose loops are always this short stays unknown */
     learn(cost, (orb_clock() - start) / (double)(loop->count - first * loop->grain));
   }
   for (int i = 0; i < atomic_load(&pool->ranges); i++) {

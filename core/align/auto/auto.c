@@ -217,22 +217,12 @@ static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_opt
   return won.is_second ? choose_other(ctx, m, 0, NULL, won.clear) : ORB_OK;
 }
 
-static orb_status fill_target(orb_context *ctx, void *user) {
-  return orb_match_fill_target(ctx, user);
-}
-
-/* Makes room for the target of the match of two shapes. */
-static orb_status reserve_target(orb_context *ctx, const orb_mesh *second, matches *m) {
-  m->of[1].target = ORB_NEW(ctx, double, 3 * (size_t)second->vertex_count);
-  m->targets[1] = m->of[1].target;
-  return m->targets[1] ? ORB_OK : ORB_E_NO_MEMORY;
-}
-
-/* Computes the targets of all matches. */
-static orb_status aim(orb_context *ctx, matches *m) {
+/* Computes the targets of all matches; that of two shapes is only aimed at, and filled later. */
+static orb_status aim(orb_context *ctx, matches *m, orb_map_aim *later) {
   for (int32_t s = 1; s < m->shape_count; s++) {
     if (m->of[s].is_found) {
-      ORB_TRY(orb_match_target(ctx, &m->of[s], 0, 1, &m->of[s].target));
+      ORB_TRY(m->shape_count == 2 ? orb_match_aim(ctx, &m->of[s], later)
+                                  : orb_match_target(ctx, &m->of[s], 0, 1, &m->of[s].target));
     }
     m->targets[s] = m->of[s].target;
   }
@@ -279,10 +269,10 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   next_match next = {0};
   orb_status status;
   orb_map_course course = {0};
-  const int is_pair = m->shape_count == 2 && m->of[1].is_found;
-  ORB_TRY(is_pair ? reserve_target(ctx, shapes[1].mesh, m) : aim(ctx, m));
+  orb_map_aim later = {0};
+  ORB_TRY(aim(ctx, m, &later));
   const orb_aims aims = {.targets = m->targets,
-                         .aim = {is_pair ? fill_target : NULL, &m->of[1]},
+                         .aim = later,
                          .keep_angles = m->keep_angles,
                          .course = m->shape_count == 2 ? &course : NULL, /* only pairs have a next match */
                          .walks_first = m->bend > ORB_FIND_WALKS_FIRST,

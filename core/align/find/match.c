@@ -286,15 +286,26 @@ orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n,
   return one->cost < INFINITY ? write_targets(ctx, t, one, moving, target) : ORB_OK;
 }
 
-orb_status orb_match_fill_target(orb_context *ctx, const orb_match *match) {
+static size_t target_count(const orb_match *match) {
+  return 3 * (size_t)match->trials->mesh[1]->vertex_count;
+}
+
+static orb_status fill_target(orb_context *ctx, void *user) {
+  const orb_match *match = user;
   double *target;
   orb_status status = orb_match_target(ctx, match, 0, 1, &target);
   if (status == ORB_OK) {
-    ORB_ASSERT(target && match->target); /* the best map has its way back */
-    memcpy(match->target, target, 3 * (size_t)match->trials->mesh[1]->vertex_count * sizeof *target);
+    ORB_ASSERT(target); /* the best map has its way back */
+    memcpy(match->target, target, target_count(match) * sizeof *target);
   }
   orb_free(ctx, target);
   return status;
+}
+
+orb_status orb_match_aim(orb_context *ctx, orb_match *match, orb_map_aim *aim) {
+  match->target = ORB_NEW(ctx, double, target_count(match));
+  *aim = (orb_map_aim){fill_target, match};
+  return match->target ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
 orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, double *target, double clear) {

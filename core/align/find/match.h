@@ -38,6 +38,7 @@
 
 #include "align/find/hint.h"
 #include "align/find/inset/inset.h"
+#include "align/map/engine/guide.h"
 
 enum {
   ORB_MATCH_PAIRS = 12, /* most pairs of a match */
@@ -72,8 +73,8 @@ typedef struct orb_match {
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  orb_inset inset; /* whether one shape is a part of the other one; only searched if `walks` and the shapes bend */
-  double *target;  /* the caller's to set, with orb_match_target() or orb_match_fill_target(); freed with the match */
+  orb_inset inset;    /* whether one shape is a part of the other one; only searched if `walks` and the shapes bend */
+  double *target;     /* the caller's to set, with orb_match_target() or orb_match_aim(); freed with the match */
   orb_trials *trials; /* the candidates, for the functions below */
 } orb_match;
 
@@ -93,8 +94,9 @@ ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first
  */
 ORB_MUST_CHECK orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving,
                                            double **target);
-/* Computes where the best map takes each vertex of the second shape into match->target, which has room for 3 each. */
-ORB_MUST_CHECK orb_status orb_match_fill_target(orb_context *ctx, const orb_match *match);
+/* The same for the second shape and the best map, later: makes room in match->target, and sets *aim to what fills it.
+ * The match must outlive it. */
+ORB_MUST_CHECK orb_status orb_match_aim(orb_context *ctx, orb_match *match, orb_map_aim *aim);
 /* Makes other[k] the best map; the former best map becomes the first of the others. target: NULL, or that of other[k];
  * the match takes ownership of it, also on a failure. clear: how far the former best map is behind, by the measure that
  * decided. Sets lead to 1, because the bends contradict the choice. */

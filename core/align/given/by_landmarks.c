@@ -119,10 +119,6 @@ static orb_status ask_pins(void *user, double energy, int *goes_on) {
   return ORB_OK;
 }
 
-static orb_status fill_target(orb_context *ctx, void *user) {
-  return orb_match_fill_target(ctx, user);
-}
-
 /* What the pose of one shape has led to. Without a match, or without a map, the energies are INFINITY. */
 typedef struct posed_map {
   double energy, loose; /* loose: before the map is fitted in space */
@@ -172,15 +168,12 @@ static orb_status compose_posed(orb_context *ctx, const posing *all, int32_t i) 
   ORB_GO(status, orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, competes, &match), done);
   out->is_unsure = match.is_unsure;
   if (match.is_found) {
-    match.target = ORB_NEW(ctx, double, 3 * (size_t)moving->mesh.vertex_count);
-    if (!match.target) {
-      status = ORB_E_NO_MEMORY;
-      goto done;
-    }
+    orb_map_aim aim;
+    ORB_GO(status, orb_match_aim(ctx, &match, &aim), done);
     const int walks_first = competes && match.bend > ORB_FIND_WALKS_FIRST;
     const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE,
                                  .target = match.target,
-                                 .aim = {fill_target, &match},
+                                 .aim = aim,
                                  .fits_parts = 1,
                                  .keeps_angles = all->keeps_angles,
                                  .course = &course,
@@ -198,17 +191,23 @@ done:
   return status;
 }
 
+static void note_empty(posing *all, int32_t i) {
+  int first = atomic_load(&all->first_empty);
+  while (i < first && !atomic_compare_exchange_weak(&all->first_empty, &first, i)) {
+  }
+}
+
+/* What those after an empty one lead to does not count, errors included: how many have begun depends on the threads. */
 static orb_status compose_unless_empty(orb_context *ctx, void *arg, int32_t i) {
   posing *all = arg;
   if (atomic_load(&all->first_empty) < i) {
     return ORB_OK;
   }
-  orb_status status = compose_posed(ctx, all, i);
-  int first = atomic_load(&all->first_empty);
-  while (status == ORB_OK && !(all->map[i].loose < INFINITY) && i < first &&
-         !atomic_compare_exchange_weak(&all->first_empty, &first, i)) {
+  const orb_status status = compose_posed(ctx, all, i);
+  if (status == ORB_OK && !(all->map[i].loose < INFINITY)) {
+    note_empty(all, i);
   }
-  return first < i ? ORB_OK : status;
+  return atomic_load(&all->first_empty) < i ? ORB_OK : status;
 }
 
 /* Composes the maps to all shapes but the first. */

@@ -55,7 +55,6 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
-#include "base/tasks.h"
 
 /* Walks to a map in which all pairs meet: through many samples if they are usable, else through few or none. */
 static orb_status walk_pairs(orb_map_run *c, int *stuck) {
@@ -244,31 +243,6 @@ static orb_status choose_moving(orb_context *ctx, const orb_map_params *params, 
   return part == ORB_MAP_NO_PART ? orb_map_should_swap(ctx, params, fixed, moving, swap) : ORB_OK;
 }
 
-/* A run that is opened while its target is filled. */
-typedef struct aimed_opening {
-  orb_map_run *run;
-  const orb_map_guide *guide;
-  double *energy;
-} aimed_opening;
-
-static orb_status open_or_aim(orb_context *ctx, void *arg, int32_t task) {
-  const aimed_opening *o = arg;
-  if (task == 1) {
-    return o->guide->aim.fill(ctx, o->guide->aim.user);
-  }
-  orb_map_run *c = o->run;
-  orb_context *whole = c->ctx;
-  c->ctx = ctx;
-  const orb_status status = orb_map_run_open(c, o->guide, o->energy);
-  c->ctx = whole;
-  return status;
-}
-
-static orb_status open_run(orb_map_run *c, const orb_map_guide *guide, double energy[2]) {
-  aimed_opening o = {c, guide, energy};
-  return guide->aim.fill ? orb_tasks_run(c->ctx, 2, open_or_aim, &o) : orb_map_run_open(c, guide, energy);
-}
-
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                        int32_t landmark_count, const orb_map_guide *guide, orb_preset preset, double energy[2],
                        int *improved) {
@@ -285,7 +259,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   }
   orb_map_run c = orb_map_run_of(ctx, fixed, moving, both, landmark_count, guide, preset);
   orb_status status;
-  ORB_GO(status, open_run(&c, guide, energy), done);
+  ORB_GO(status, orb_map_run_open(&c, guide, energy), done);
   if (guide->from == ORB_MAP_FROM_PINS || guide->from == ORB_MAP_FROM_SPRINGS) {
     ORB_GO(status, let_go(&c), done);
     ORB_GO(status, orb_map_run_fit(&c, guide->from, energy[0]), done);

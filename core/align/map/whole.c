@@ -113,11 +113,15 @@ typedef struct opening {
   double energy; /* of the map as given */
 } opening;
 
-enum { OPEN_PACKED, OPEN_ENERGY, OPEN_PAIRS, OPENINGS };
+enum { OPEN_TARGET, OPEN_PACKED, OPEN_ENERGY, OPEN_PAIRS, OPENINGS }; /* the longest comes first */
 
 static orb_status open_one(orb_context *ctx, void *arg, int32_t what) {
   opening *o = arg;
   orb_map_run *c = o->run;
+  const orb_map_aim *aim = &o->guide->aim;
+  if (what == OPEN_TARGET) {
+    return aim->fill ? aim->fill(ctx, aim->user) : ORB_OK;
+  }
   if (what == OPEN_PACKED) {
     return orb_map_packed_create(ctx, &c->fixed->mesh, &c->b, &c->packed);
   }
@@ -131,7 +135,8 @@ static orb_status open_one(orb_context *ctx, void *arg, int32_t what) {
              : orb_map_energy_of(&o->measured, o->measured.moving->points, o->measured.params.energy.cap, &o->energy);
 }
 
-/* Measures the map as given and finds the pairs. energy: as of orb_compose(), both of the map as given. */
+/* Measures the map as given, finds the pairs and fills the target. energy: as of orb_compose(), both of the map as
+ * given. */
 orb_status orb_map_run_open(orb_map_run *c, const orb_map_guide *guide, double energy[2]) {
   const orb_aligned_shape *moving = c->moving;
   ORB_TRY(orb_map_run_prepare(c));

@@ -9,10 +9,11 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                            int32_t landmark_count, const orb_map_guide *guide, orb_preset preset);
 void orb_map_run_free(orb_map_run *run);
 
-/* Allocates what a run holds, and scales both shapes. Free the run in any case. O(n log n). */
-ORB_MUST_CHECK orb_status orb_map_run_prepare(orb_map_run *run);
-/* The same, and measures the map as given and finds the pairs. energy: as of orb_compose(), both of the map as given.
+/* Allocates what a run holds but for the packed surface, and scales both shapes. Free the run in any case. O(n log n).
  */
+ORB_MUST_CHECK orb_status orb_map_run_prepare(orb_map_run *run);
+/* The same, packs the surface, measures the map as given, finds the pairs and fills the target that the guide aims at.
+ * energy: as of orb_compose(), both of the map as given. */
 ORB_MUST_CHECK orb_status orb_map_run_open(orb_map_run *run, const orb_map_guide *guide, double energy[2]);
 
 /* Is the map so bad that no last step is worth its time? */

@@ -59,7 +59,7 @@ typedef struct orb_map_rival {
 } orb_map_rival;
 
 /* Fills the target of a guide while the run opens: both take about as long. It runs once, on a context of its own, and
- * writes nothing but the target. Only orb_compose() asks for it. */
+ * writes nothing but the target. */
 typedef struct orb_map_aim {
   orb_status (*fill)(orb_context *ctx, void *user); /* NULL: it is filled already */
   void *user;
@@ -69,7 +69,7 @@ typedef struct orb_map_aim {
 typedef struct orb_map_guide {
   orb_map_from from;
   const double *target; /* NULL, or where each vertex of `moving` lies on the fixed shape, 3 per vertex in its space;
-                     replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
+                           replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
   orb_map_aim aim;      /* of the target */
   int keeps_angles;     /* the spheres do (sheet/even.h); then embeddings made on the way do as well, and the places of
                            the targets are smoothed */
