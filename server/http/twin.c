@@ -5,14 +5,25 @@
 #include <pthread.h>
 #include <string.h>
 
+enum { DATE = 29 }; /* bytes of "Sun, 06 Nov 1994 08:49:37 GMT", the only form that libmicrohttpd writes */
+
+/* The bytes of a head before the value of its Date; its whole size where it has none. */
+static size_t before_date(const char *head, size_t size) {
+  static const char NAME[] = "\r\nDate: ";
+  const char *found = memmem(head, size, NAME, sizeof NAME - 1);
+  size_t before = found ? (size_t)(found - head) + sizeof NAME - 1 : size;
+  return before + DATE <= size ? before : size;
+}
+
 size_t twin_head(const void *bytes, size_t size) {
   static const char START[] = "HTTP/1.", END[] = "\r\n\r\n";
-  const char *first = bytes;
+  const char *first = bytes, *second = first + size / 2;
   size_t half = size / 2, start = sizeof START - 1, end = sizeof END - 1;
-  return size % 2 == 0 && half >= start + end && memcmp(first, START, start) == 0 &&
-                 memcmp(first + half - end, END, end) == 0 && memcmp(first, first + half, half) == 0
-             ? half
-             : 0;
+  if (size % 2 != 0 || half < start + end || memcmp(first, START, start) != 0 || memcmp(second - end, END, end) != 0) {
+    return 0;
+  }
+  size_t before = before_date(first, half), after = before < half ? before + DATE : half;
+  return memcmp(first, second, before) == 0 && memcmp(first + after, second + after, half - after) == 0 ? half : 0;
 }
 
 typedef ssize_t sender(gnutls_session_t, const void *, size_t);

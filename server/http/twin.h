@@ -10,7 +10,8 @@
 
 #include <stddef.h>
 
-/* The length of the first of two heads that are all of these bytes; 0: they are something else. */
+/* The length of the first of two heads that are all of these bytes; 0: they are something else. The two may differ in
+ * their Date: libmicrohttpd asks for the time before each, and a second may end between them. */
 size_t twin_head(const void *bytes, size_t size);
 
 #endif
