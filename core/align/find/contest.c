@@ -79,7 +79,7 @@ static orb_status walk_all(orb_context *ctx, contest *c) {
   }
   c->round[0] = SPACE;
   c->round[1] = SECOND;
-  c->count = c->match->other_count > 0 && c->match->other[0].cost <= ORB_FIND_OTHER_BEHIND ? 2 : 1;
+  c->count = c->match->other_count > 0 && c->match->other[0].cost <= ORB_FIND_CONTEST_BEHIND ? 2 : 1;
   return orb_tasks_run(ctx, c->count, walk, c);
 }
 

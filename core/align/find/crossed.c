@@ -21,12 +21,19 @@ static void fill_inverse(const orb_trials *t, const orb_trial *one, int s, int32
   }
 }
 
+/* Trials that are crossed side by side. */
+typedef struct crossing {
+  orb_trials *t;
+  double most; /* cost of one that is crossed */
+} crossing;
+
 static orb_status cross(orb_context *ctx, void *arg, int32_t i) {
-  const orb_trials *t = arg;
-  orb_trial *one = &((orb_trials *)arg)->trial[i], crossed = {0};
+  const crossing *all = arg;
+  const orb_trials *t = all->t;
+  orb_trial *one = &all->t->trial[i], crossed = {0};
   orb_status status;
-  if (!(one->cost < INFINITY)) {
-    return ORB_OK; /* it was dropped */
+  if (!(one->cost < INFINITY) || one->cost > all->most) {
+    return ORB_OK; /* it was dropped, or is far behind */
   }
   ORB_GO(status, orb_context_check(ctx), end);
   ORB_GO(status, orb_trial_create(ctx, t, &crossed), end);
@@ -50,5 +57,6 @@ end:
 }
 
 orb_status orb_trials_cross(orb_trials *t) {
-  return orb_trials_bend_much(t) ? orb_tasks_run(t->ctx, t->count, cross, t) : ORB_OK;
+  crossing all = {t, ORB_FIND_CROSSED_BEHIND * t->trial[orb_trials_best(t)].cost};
+  return orb_trials_bend_much(t) ? orb_tasks_run(t->ctx, t->count, cross, &all) : ORB_OK;
 }

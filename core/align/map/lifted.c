@@ -33,8 +33,7 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   orb_map_level level = {0};
   int32_t flips = 0;
   orb_status status;
-  const orb_map_finish finish = {
-      .hold = copy->lets_go ? 0 : c->params.copies.hold, .rough = c->vertex_count > c->params.copies.rough, .irons = 1};
+  orb_map_finish finish = {.hold = copy->lets_go ? 0 : c->params.copies.hold};
   c->pairs.count = c->pairs.landmarks;
   orb_map_levels_adopt(c, copy->hierarchy);
   set_start(c, copy);
@@ -50,6 +49,9 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
     goto done;
   }
   set_targets(c, &level);
+  const int is_poor = orb_map_level_energy(&level) > c->params.copies.poor;
+  finish.rough = is_poor || c->vertex_count > c->params.copies.rough;
+  finish.irons = !is_poor;
   status = orb_map_levels_finish(c, r, &level, &finish);
 done:
   orb_map_level_free(c->ctx, &level);

@@ -56,6 +56,7 @@ typedef struct collapser {
   orb_quadric *quadric; /* per net vertex, one per shape */
   orb_heap heap;        /* vertices by the cost of their best target */
   int32_t *target;      /* per vertex: its best target */
+  uint64_t *marks;      /* per vertex: of its neighbours (marks.h) */
   int64_t live;
   plan *batch;
   int32_t *later, waiting;  /* taken from the heap but too near to the batch: for the next one */
@@ -258,7 +259,7 @@ static int next_target(const double *cost, int n) {
 /* A mark of what decides whether u can be removed; the last bit says that the search was thorough. */
 static uint64_t mark_of(const collapser *c, int32_t u) {
   uint64_t mark = orb_mark_mix(4 + (uint64_t)c->strict, &c->limit2, sizeof c->limit2);
-  uint64_t sum = orb_mark_of_surroundings(&c->placed->net, u);
+  uint64_t sum = orb_mark_of_surroundings(&c->placed->net, c->marks, u);
   return (orb_mark_mix(mark, &sum, sizeof sum) & ~UINT64_C(1)) | (uint64_t)c->thorough;
 }
 
@@ -318,12 +319,14 @@ static void find_range(void *arg, int64_t begin, int64_t end, int thread) {
 static void carry_out(collapser *c, plan *p) {
   if (p->at >= 0) {
     int32_t v = p->ring[p->at];
+    orb_marks_collapse(&c->placed->net, c->marks, p->u, p->ring, p->n, p->at);
     collapse(c, orb_net_edge(&c->placed->net, p->u, v));
     for (int i = 0; i < p->n; i++) {
       int32_t w = p->ring[i];
       p->cost[i] = w == v ? least_cost(c, v, &c->target[v]) : least_cost_after(c, w, p->u, v);
     }
   } else if (p->fills) {
+    orb_marks_fill(&c->placed->net, c->marks, p->u, p->ring, p->n, p->triangles);
     orb_adaptive_fill(c->placed, p->u, p->ring, p->n, p->triangles);
     hand_over_quadrics(c, p->u, p->heir);
     for (int i = 0; i < p->n; i++) {
@@ -457,12 +460,14 @@ orb_status orb_adaptive_collapse(orb_context *ctx, orb_placed_net *placed, doubl
                  .live = orb_placed_live(placed)};
   c.quadric = ORB_NEW(ctx, orb_quadric, (int64_t)vertices * placed->shape_count);
   c.target = ORB_NEW(ctx, int32_t, vertices);
+  c.marks = ORB_NEW(ctx, uint64_t, vertices);
   c.batch = ORB_NEW(ctx, plan, BATCH_MOST);
   c.later = ORB_NEW(ctx, int32_t, BATCH_MOST);
   c.taken = ORB_NEW0(ctx, uint32_t, vertices);
-  int fine = orb_heap_open(ctx, &c.heap, vertices) && c.quadric && c.target && c.batch && c.later && c.taken;
+  int fine = orb_heap_open(ctx, &c.heap, vertices) && c.quadric && c.target && c.marks && c.batch && c.later && c.taken;
   orb_status status = fine ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
+    orb_marks_of_rings(ctx, &placed->net, c.marks);
     orb_parallel_for(ctx, vertices, GRAIN, quadric_range, &c);
     orb_parallel_for(ctx, vertices, GRAIN, cost_range, &c);
     for (int32_t v = 0; v < vertices; v++) {
@@ -478,6 +483,7 @@ orb_status orb_adaptive_collapse(orb_context *ctx, orb_placed_net *placed, doubl
   orb_heap_close(ctx, &c.heap);
   orb_free(ctx, c.quadric);
   orb_free(ctx, c.target);
+  orb_free(ctx, c.marks);
   orb_free(ctx, c.batch);
   orb_free(ctx, c.later);
   orb_free(ctx, c.taken);

@@ -32,6 +32,7 @@ typedef struct repairer {
   orb_star_goal goal;
   int32_t *inverted;  /* the triangles of a pass */
   unsigned char *way; /* for each: the way that was found, or NO_WAY */
+  uint64_t *marks;    /* per vertex: of its neighbours (marks.h), while ways are searched */
   int thread;         /* ≥ 0: only test whether a way works, on this thread */
 } repairer;
 
@@ -142,7 +143,7 @@ static int try_way(const repairer *m, int32_t t, int way) {
 static uint64_t mark_of(const repairer *m, int32_t t) {
   uint64_t mark = orb_mark_mix(1, &m->limit2, sizeof m->limit2), sum = (uint64_t)m->goal;
   for (int k = 0; k < 3; k++) {
-    sum += orb_mark_of_surroundings(&m->placed->net, m->placed->net.triangles[3 * (int64_t)t + k]);
+    sum += orb_mark_of_surroundings(&m->placed->net, m->marks, m->placed->net.triangles[3 * (int64_t)t + k]);
   }
   mark = orb_mark_mix(mark, &sum, sizeof sum);
   return mark ? mark : 1;
@@ -195,12 +196,25 @@ static orb_status flip_and_move(repairer *m, unsigned char *marked, int64_t *see
   return status;
 }
 
+/* Searches a way for every inverted triangle, side by side. */
+static orb_status find_all(repairer *m, int64_t count) {
+  m->marks = ORB_NEW(m->ctx, uint64_t, m->placed->net.vertex_count);
+  if (!m->marks) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_marks_of_rings(m->ctx, &m->placed->net, m->marks);
+  orb_parallel_for(m->ctx, count, 1, find_range, m);
+  orb_free(m->ctx, m->marks);
+  m->marks = NULL;
+  return ORB_OK;
+}
+
 /* Tries to repair every inverted triangle; new ones wait for the next pass. */
 static orb_status pass(repairer *m, unsigned char *marked, int64_t *seen, int64_t *left) {
   ORB_TRY(flip_and_move(m, marked, seen, left));
   ORB_TRY(orb_placed_reserve(m->ctx, m->placed, orb_threads(m->ctx)));
   int64_t count = *left;
-  orb_parallel_for(m->ctx, count, 1, find_range, m);
+  ORB_TRY(find_all(m, count));
   for (int64_t i = 0; i < count; i++) {
     int32_t t = m->inverted[i];
     if (m->way[i] == NO_WAY || !is_inverted(m->placed, t)) {

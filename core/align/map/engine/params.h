@@ -94,6 +94,8 @@ typedef struct orb_map_params {
                       whole shape costs less than a copy and its lift */
     int32_t rough; /* vertices above which the lift does not loosen its levels: that takes as long as all sweeps, and
                       brings less the finer a level is */
+    double poor;   /* energy of a copy's map above which its lift neither loosens nor irons: it is no map of shapes that
+                      correspond. Five such pairs align in 0.5 to 0.7 of the time, and come to 4 % more energy */
     double hold;   /* pull that holds the vertices of a copy in its lift, as slide.pull. Without it they go back from
                       where a slide has taken them: with 8 landmarks, eight pairs of 26,000 vertices stay 23 % farther
                       from the truth than on a fourth of the vertices. They stay 15 % farther with 30, 6 % with 300, 5 %
@@ -112,13 +114,12 @@ typedef struct orb_map_params {
                       more than this factor. With 1.25 to 1.32 three pairs of people came to 1.06 to 1.13 from it, two
                       of them to 1.10 and 1.25 from a coarser one; with 1.38 to 1.54 two pairs came to 1.22 to 1.88, and
                       to 1.14 to 1.23 from a coarser one */
-    double crumpled; /* energy of the first start up to which it is drawn at once */
-    double drawn;    /* energy above which the map is not drawn: it stays caught */
-    double passed; /* energy of the map of all starts above which passes follow. Of 34 maps with less, none gained more
-                      than 0.3 %. With `quality` they always follow */
-    double gain;   /* a map is drawn again if the first draw has brought the energy below this share. In 38 runs of
-                      people, animals of both halves and others, the second draw gained at most 0.1 % after a smaller
-                      gain (23 runs), and up to 4 % after a larger one. With `quality` it always is */
+    double crumpled;    /* energy of the first start up to which it is drawn at once */
+    double drawn;       /* energy above which the map is not drawn: it stays caught */
+    double passed;      /* energy of the map above which passes follow: always with `quality`, else never (targets.c) */
+    double gain;        /* a map is drawn again if the first draw has brought the energy below this share. In 38 runs of
+                           people, animals of both halves and others, the second draw gained at most 0.1 % after a smaller
+                           gain (23 runs), and up to 4 % after a larger one. With `quality` it always is */
     double contested;   /* energy of a pose above which pins compete with it, as a rival or afterwards. Where poses had
                            1.2 to 1.25, pins lost in 5 of 5 runs */
     double asked_first; /* energy above which it is asked before the map is drawn, which is work in vain if the rival

@@ -85,7 +85,6 @@ typedef struct orb_map_run {
   double hopeless;   /* a start whose first map has more energy is given up */
   double crumpled;   /* a start whose energy rises by more than this factor while flips are cleared is given up, */
   int is_crumpled;   /* and this is 1 */
-  int has_started_coarser; /* from the targets that are given */
   struct {
     double energy, share; /* that it has left, and the share of the energy before; 0: nothing was drawn */
   } last_draw;
