@@ -178,21 +178,12 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
   return ORB_OK;
 }
 
-/* No match has led to the map. */
-static void count_as_unclear(matches *m) {
-  m->clear = 0;
-  m->lead = 1;
-}
-
-/* Composes two shapes that bend much towards their match, or towards what leads to a better map where that is poor. If
- * it is what fits best in space, the match counts as unclear. */
+/* Composes two shapes that bend much towards their match, or towards the next best one if that leads to a better map
+ * where both are poor. */
 static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_options *options,
                                orb_alignment *alignment) {
   orb_contest_result won;
   ORB_TRY(orb_contest_run(ctx, &m->of[1], options->preset, alignment, &won));
-  if (won.is_space) {
-    count_as_unclear(m);
-  }
   return won.is_second ? choose_other(ctx, m, 0, NULL, won.clear) : ORB_OK;
 }
 

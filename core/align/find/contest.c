@@ -10,9 +10,8 @@
 #include "base/memory.h"
 #include "base/tasks.h"
 
-/* Contestants: the match with the shape moving that it names, the same with the other one, the next best match, and
- * what fits best in space. */
-enum { MATCH, TURNED, SECOND, SPACE, MOST };
+/* Contestants: the match with the shape moving that it names, the same with the other one, and the next best match. */
+enum { MATCH, TURNED, SECOND, MOST };
 
 typedef struct contest {
   const orb_match *match;
@@ -45,11 +44,9 @@ static orb_status walk(orb_context *ctx, void *arg, int32_t i) {
   const int32_t n = c->round[i];
   const int moving = moving_of(c, n);
   orb_aligned_shape *shapes = c->alignment->shapes;
-  if (n != SPACE) {
-    ORB_TRY(orb_match_target(ctx, c->match, n == SECOND, moving, &c->target[n]));
-    if (!c->target[n]) {
-      return ORB_OK;
-    }
+  ORB_TRY(orb_match_target(ctx, c->match, n == SECOND, moving, &c->target[n]));
+  if (!c->target[n]) {
+    return ORB_OK;
   }
   return orb_map_draft_create(ctx, &shapes[1 - moving], &shapes[moving], c->target[n], c->known, c->preset,
                               &c->draft[n], &c->energy[n]);
@@ -66,21 +63,19 @@ static int32_t least_of(const contest *c, int32_t omit) {
   return least;
 }
 
-/* The match walks both ways side by side. If both walks are poor, the next best match and what fits best in space walk
- * too. */
+/* The match walks both ways side by side. If both walks are poor, the next best match walks too. */
 static orb_status walk_all(orb_context *ctx, contest *c) {
   c->round[0] = MATCH;
   c->round[1] = TURNED;
   c->count = first_may_move(c) ? 2 : 1;
   ORB_TRY(orb_tasks_run(ctx, c->count, walk, c));
   c->known = fmin(c->energy[MATCH], c->energy[TURNED]);
-  if (c->known <= ORB_FIND_CONTEST_POOR) {
+  if (c->known <= ORB_FIND_CONTEST_POOR || c->match->other_count == 0 ||
+      c->match->other[0].cost > ORB_FIND_CONTEST_BEHIND) {
     return ORB_OK;
   }
-  c->round[0] = SPACE;
-  c->round[1] = SECOND;
-  c->count = c->match->other_count > 0 && c->match->other[0].cost <= ORB_FIND_CONTEST_BEHIND ? 2 : 1;
-  return orb_tasks_run(ctx, c->count, walk, c);
+  c->round[0] = SECOND;
+  return walk(ctx, c, 0);
 }
 
 static orb_status finish(orb_context *ctx, void *arg, int32_t i) {
@@ -124,7 +119,6 @@ static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *
   if (c->energy[c->round[second]] - 1 < ORB_FIND_CONTEST_GAIN * (c->energy[winner] - 1)) {
     winner = c->round[second];
   }
-  out->is_space = winner == SPACE;
   out->is_second = winner == SECOND;
   if (winner == SECOND) {
     out->clear = lead_of_second(c);

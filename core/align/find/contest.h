@@ -2,11 +2,12 @@
  *
  * Their match leads to a map by landmark walks, whose energy on a coarse level tells how good the map will be. Either
  * shape can move, so both do, side by side. If both walks are poor, the shapes hardly correspond: then the next best
- * match and what fits best in space walk as well. The best walk is finished, and another one that is close.
+ * match walks as well. The best walk is finished, and another one that is close.
  *
- * Rejected: walks towards the next best match in any case. Of 131 pairs of animals of other kinds, one of the two best
- * matches was right in 47 whose walks were compared: the best one in 45. The walk with less energy was the right one in
- * 37. */
+ * Rejected: a walk towards what fits best in space, where both are poor. Of 25 contests of real meshes it won two, one
+ * of them by 12 %, and took 0.6 s each time. Walks towards the next best match in any case. Of 131 pairs of animals of
+ * other kinds, one of the two best matches was right in 47 whose walks were compared: the best one in 45. The walk with
+ * less energy was the right one in 37. */
 #ifndef ORB_ALIGN_FIND_CONTEST_H
 #define ORB_ALIGN_FIND_CONTEST_H
 
@@ -16,7 +17,6 @@
 
 /* What has won. All 0: the match. clear counts for another match. */
 typedef struct orb_contest_result {
-  int is_space;  /* what fits best in space */
   int is_second; /* the next best match */
   double clear;  /* how clearly it has won, 0 to 1 */
 } orb_contest_result;

@@ -210,8 +210,7 @@ static const double ORB_FIND_CONTEST_GAIN = 0.95;
  * towards one match differ by a tenth, so they do not tell closer ones apart. */
 static const double ORB_FIND_CONTEST_CLOSE = 1.15;
 /* If both walks of the match have more energy than this, the next best match walks too, unless it bends CONTEST_BEHIND
- * times as much, and what fits best in space: about 1 s of both threads. Of 25 such contests of 117 between real meshes,
- * the next best match won eight, and space two. */
+ * times as much. Of 25 such contests of 117 between real meshes, it won eight. */
 static const double ORB_FIND_CONTEST_POOR = 2.5, ORB_FIND_CONTEST_BEHIND = 4;
 /* If the mean energy of the maps of several matches is above this, their pairs are pinned. Chosen when two shapes were
  * pinned as well: three such pairs came to 1.9, 2.2 and 4.4 in 10 s. */

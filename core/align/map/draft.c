@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-#include "align/map/starts/place.h"
 #include "align/map/targets.h"
 #include "align/map/walked.h"
 #include "align/map/whole.h"
@@ -13,25 +12,8 @@ struct orb_map_draft {
   orb_map_run run;
   orb_map_walked walked;
   orb_aligned_shape *fixed;
-  double *target;   /* what fits best in space, if no target was given */
   double energy[2]; /* as of orb_compose() */
 };
-
-/* Gives the run the target that fits best in space. */
-static orb_status aim_in_space(orb_map_draft *d) {
-  orb_map_run *c = &d->run;
-  const size_t count = 3 * (size_t)c->vertex_count;
-  d->target = ORB_NEW(c->ctx, double, count);
-  if (!d->target) {
-    return ORB_E_NO_MEMORY;
-  }
-  ORB_TRY(orb_map_register(c, 0));
-  for (size_t i = 0; i < count; i++) {
-    d->target[i] = c->target[i] / c->b.scale + c->b.centre[i % 3];
-  }
-  c->given_target = d->target;
-  return ORB_OK;
-}
 
 orb_status orb_map_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving,
                                 const double *target, double known, orb_preset preset, orb_map_draft **out,
@@ -44,9 +26,6 @@ orb_status orb_map_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_
   d->run = orb_map_run_of(ctx, fixed, moving, 1, 0, &guide, preset);
   d->fixed = fixed;
   ORB_TRY(orb_map_run_open(&d->run, &guide, d->energy));
-  if (!target) {
-    ORB_TRY(aim_in_space(d));
-  }
   d->run.beat.energy = known < INFINITY ? known : 0; /* fewer walks are then tried */
   ORB_TRY(orb_map_target_walks(&d->run, &d->walked));
   d->run.beat.energy = 0;
@@ -78,7 +57,6 @@ void orb_map_draft_free(orb_context *ctx, orb_map_draft *d) {
     d->run.ctx = ctx;
     orb_map_walked_free(&d->run, &d->walked);
     orb_map_run_free(&d->run);
-    orb_free(ctx, d->target);
     orb_free(ctx, d);
   }
 }

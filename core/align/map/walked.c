@@ -113,7 +113,7 @@ static orb_status loosen_coarse(orb_map_run *c, orb_map_walked *w) {
   return leave(c, w);
 }
 
-/* Loosening hardly changes which walk is the best one, so only that is loosened. */
+/* Loosening hardly changes which walk is the best one, so only that is loosened, unless it is lost. */
 orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
   const orb_map_params *p = &c->params;
   const double given = best->energy;
@@ -136,7 +136,7 @@ orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
     ORB_TRY(status);
   }
   orb_map_allow(c, p->walked.work);
-  return best->energy < given ? loosen_coarse(c, best) : ORB_OK;
+  return best->energy < given && best->energy <= p->walked.lost ? loosen_coarse(c, best) : ORB_OK;
 }
 
 orb_status orb_map_walked_refine(orb_map_run *c, orb_map_walked *w) {

@@ -55,6 +55,7 @@ static const orb_map_params DEFAULTS = {
                .barriers = {0.1, 1},
                .hopeless = 3,
                .twisted = 2.5,
+               .lost = 4,
                .work = 800,
                .guides = {18, 50, -25, -35, 25, -18},
                .few = {6, 4},
