@@ -22,7 +22,7 @@ typedef struct bench {
 
 static void set_up(bench *b) {
   b->ctx = remesh_context(2);
-  sphere_shape(b->ctx, SPHERE_ICO, 6, 0.2, 3, &b->shape);
+  sphere_shape(b->ctx, SPHERE_ICO, 3, 0.2, 3, &b->shape);
   const orb_mesh *mesh = &b->shape.mesh;
   assert_int_equal(orb_net_init(b->ctx, &b->net, b->shape.points, mesh->vertex_count, mesh->triangles,
                                 mesh->triangle_count, NULL, mesh->vertex_count),
