@@ -12,7 +12,7 @@ static size_t before_date(const char *head, size_t size) {
   static const char NAME[] = "\r\nDate: ";
   const char *found = memmem(head, size, NAME, sizeof NAME - 1);
   size_t before = found ? (size_t)(found - head) + sizeof NAME - 1 : size;
-  return before + DATE <= size ? before : size;
+  return before + DATE + 4 <= size ? before : size; /* the end of the head is compared in any case */
 }
 
 size_t twin_head(const void *bytes, size_t size) {

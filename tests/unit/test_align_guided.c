@@ -67,6 +67,7 @@ static void dog_to_giraffe(void **state) {
   orb_even_shapes_free(ctx, &even);
   assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, 1, &match), ORB_OK);
   assert_int_equal(orb_contest_run(ctx, &match, ORB_PRESET_DEFAULT, &alignment, &won), ORB_OK);
+  assert_false(won.is_second);
   assert_true(alignment.energy <= orb_map_params_of(ORB_PRESET_DEFAULT).energy.poor);
   check_alignment(&alignment, 0);
   orb_alignment_free(ctx, &alignment);

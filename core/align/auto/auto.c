@@ -178,8 +178,8 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
   return ORB_OK;
 }
 
-/* Composes two shapes that bend much towards their match, or towards the next best one if that leads to a better map
- * where both are poor. */
+/* Composes two shapes that bend much towards their match, or towards the next best one if both walks of the
+ * match are poor and that leads to a better map. */
 static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_options *options,
                                orb_alignment *alignment) {
   orb_contest_result won;
@@ -253,7 +253,7 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   }
   ORB_GO(status, next_open(ctx, shapes, m, options, alignment->energy, &course, &next), end);
   if (next_is_better(&next, &course)) {
-    ORB_GO(status, next_take(ctx, m, poor, &next, alignment), end);
+    status = next_take(ctx, m, poor, &next, alignment);
   }
 end:
   next_free(ctx, &next);

@@ -5,9 +5,9 @@
  * match walks as well. The best walk is finished, and another one that is close.
  *
  * Rejected: a walk towards what fits best in space, where both are poor. Of 25 contests of real meshes it won two, one
- * of them by 12 %, and took 0.6 s each time. Walks towards the next best match in any case. Of 131 pairs of animals of
- * other kinds, one of the two best matches was right in 47 whose walks were compared: the best one in 45. The walk with
- * less energy was the right one in 37. */
+ * of them by 12 %, and took 0.6 s each time. Rejected: walks towards the next best match in any case. Of 131 pairs of
+ * animals of other kinds, one of the two best matches was right in 47 whose walks were compared: the best one in 45.
+ * The walk with less energy was the right one in 37. */
 #ifndef ORB_ALIGN_FIND_CONTEST_H
 #define ORB_ALIGN_FIND_CONTEST_H
 

@@ -9,10 +9,9 @@
 typedef struct orb_map_draft orb_map_draft;
 
 /* As orb_compose() with a target, `both` and walks_first, without landmarks, on spheres that keep angles, up to the
- * walks. known: the energy of the best walk of other drafts, or INFINITY;
- * with it, fewer walks are tried. *energy: that of the best walk; INFINITY if none leads to a map. The shapes stay as
- * they are, and must until orb_map_draft_take() or orb_map_draft_free(), as must the target. Free the draft in any
- * case. */
+ * walks. known: the energy of the best walk of other drafts, or INFINITY; with it, fewer walks are tried. *energy: that
+ * of the best walk; INFINITY if none leads to a map. The shapes stay as they are, and must until orb_map_draft_take()
+ * or orb_map_draft_free(), as must the target. Free the draft in any case. */
 ORB_MUST_CHECK orb_status orb_map_draft_create(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving,
                                                const double *target, double known, orb_preset preset,
                                                orb_map_draft **out, double *energy);

@@ -49,7 +49,7 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
     goto done;
   }
   set_targets(c, &level);
-  const int is_poor = orb_map_level_energy(&level) > c->params.copies.poor;
+  const int is_poor = !copy->lets_go && orb_map_level_energy(&level) > c->params.copies.poor;
   finish.rough = is_poor || c->vertex_count > c->params.copies.rough;
   finish.irons = !is_poor;
   status = orb_map_levels_finish(c, r, &level, &finish);

@@ -19,7 +19,8 @@ typedef struct orb_map_walked {
  * spatial targets that walk with the pairs, and are free afterwards; then all targets pull (params.walked.hold). Only a
  * map without guides can be hopeless by its energy. Afterwards the run is as it was. Free `out` in any case. */
 ORB_MUST_CHECK orb_status orb_map_walked_create(orb_map_run *run, int32_t guides, orb_map_walked *out);
-/* Walks with different numbers of guides; the map of least energy is loosened and replaces `best` if it is better. */
+/* Walks with different numbers of guides. The map of least energy replaces `best` if it is better, and is then
+ * loosened, unless its energy is above params.walked.lost. */
 ORB_MUST_CHECK orb_status orb_map_walked_improve(orb_map_run *run, orb_map_walked *best);
 void orb_map_walked_free(orb_map_run *run, orb_map_walked *walked);
 

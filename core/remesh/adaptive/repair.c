@@ -198,6 +198,9 @@ static orb_status flip_and_move(repairer *m, unsigned char *marked, int64_t *see
 
 /* Searches a way for every inverted triangle, side by side. */
 static orb_status find_all(repairer *m, int64_t count) {
+  if (count == 0) {
+    return ORB_OK;
+  }
   m->marks = ORB_NEW(m->ctx, uint64_t, m->placed->net.vertex_count);
   if (!m->marks) {
     return ORB_E_NO_MEMORY;

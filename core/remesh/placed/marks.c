@@ -8,7 +8,7 @@ static uint64_t mark_of(const orb_net *net, int32_t v) {
   return orb_mark_of_point(orb_net_point(net, v));
 }
 
-uint64_t orb_mark_of_ring(const orb_net *net, int32_t v) {
+static uint64_t mark_of_ring(const orb_net *net, int32_t v) {
   uint64_t sum = 0;
   int32_t first = net->out[v], h = first;
   do {
@@ -39,7 +39,7 @@ static void fill_range(void *arg, int64_t begin, int64_t end, int thread) {
   const filling *all = arg;
   for (int64_t v = begin; v < end; v++) {
     if (all->net->out[v] >= 0) {
-      all->ring[v] = orb_mark_of_ring(all->net, (int32_t)v);
+      all->ring[v] = mark_of_ring(all->net, (int32_t)v);
     }
   }
 }

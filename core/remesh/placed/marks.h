@@ -28,15 +28,12 @@ static inline uint64_t orb_mark_of_point(const double p[3]) {
   return mark ^ mark >> 29;
 }
 
-/* Covers the points of v's neighbours. A sum, so independent of their order. O(neighbours). */
-uint64_t orb_mark_of_ring(const orb_net *net, int32_t v);
-
-/* Covers the points of v's neighbours and of their neighbours. ring: per vertex, orb_mark_of_ring(); without it, the
- * marks of all neighbours of a vertex with n neighbours would take n² steps. O(neighbours). */
-uint64_t orb_mark_of_surroundings(const orb_net *net, const uint64_t *ring, int32_t v);
-
-/* Fills ring for all vertices that are not dead. O(vertices). */
+/* Fills ring for all vertices that are not dead: the sums of the marks of their neighbours' points. O(vertices). */
 void orb_marks_of_rings(orb_context *ctx, const orb_net *net, uint64_t *ring);
+
+/* Covers the points of v's neighbours and of their neighbours. A sum, so independent of the order of the rings. Without
+ * `ring`, the marks of all neighbours of a vertex with n neighbours would take n² steps. O(neighbours). */
+uint64_t orb_mark_of_surroundings(const orb_net *net, const uint64_t *ring, int32_t v);
 
 /* Keep ring as orb_net_collapse() and orb_net_fill() change the net: call them before. neighbour: those of u, n of
  * them, counter-clockwise. u moves onto number `at` of them, or goes, and the triangles fill its hole (corners as of

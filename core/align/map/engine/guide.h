@@ -45,10 +45,11 @@ typedef struct orb_map_course {
   int is_beaten;           /* the first start does not beat what it must beat, or the rival, and is the last */
 } orb_map_course;
 
-/* What a first start must beat; otherwise it is the last. 0: nothing. */
+/* What a first start must beat; otherwise it is the last, and so is one that leads to no map. A crumpled start does not
+ * begin anew then. */
 typedef struct orb_map_beat {
+  double energy; /* of a walk; 0: nothing must be beaten */
   double bulk;   /* of a start from targets */
-  double energy; /* of a walk */
 } orb_map_beat;
 
 /* Asks the caller whether a start from targets that has led to a map of this energy is worth more work. The caller may

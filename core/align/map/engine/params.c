@@ -41,7 +41,7 @@ static const orb_map_params DEFAULTS = {
                 .folded = 1.35,
                 .crumpled = 4.5,
                 .drawn = 2,
-                .passed = INFINITY,
+
                 .gain = 0.99,
                 .contested = 1.25,
                 .asked_first = 1.35},
@@ -203,7 +203,7 @@ orb_map_params orb_map_params_of(orb_preset preset) {
     p.work.all = 5000;
     p.work.passes = 6;
     p.work.rough = 0;
-    p.targets.passed = 0;
+    p.targets.passes = 1;
     p.targets.gain = INFINITY;
     p.level.growth = 1.3;
     p.level.first_sweeps = 300;

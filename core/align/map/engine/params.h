@@ -65,7 +65,7 @@ typedef struct orb_map_params {
   /* Levels of a start, and sweeps on them. */
   struct {
     int32_t spatial;    /* level at which a start from spatial targets begins. Coarser is faster and folds more */
-    int32_t given;      /* the same for a further attempt at targets that are given */
+    int32_t given;      /* the same for the start that follows a crumpled one */
     int32_t mapped;     /* level at which a start from a map begins: a coarser one would fold it */
     int32_t last;       /* level beyond which a start gives up untangling */
     int32_t kept;       /* least vertices of the coarsest level if vertices are kept on it, */
@@ -94,8 +94,8 @@ typedef struct orb_map_params {
                       whole shape costs less than a copy and its lift */
     int32_t rough; /* vertices above which the lift does not loosen its levels: that takes as long as all sweeps, and
                       brings less the finer a level is */
-    double poor;   /* energy of a copy's map above which its lift neither loosens nor irons: it is no map of shapes that
-                      correspond. Five such pairs align in 0.5 to 0.7 of the time, and come to 4 % more energy */
+    double poor;   /* energy of a copy's map above which its lift is rough and does not iron: such shapes do not
+                      correspond. Five pairs align in 0.5 to 0.7 of the time, and come to 4 % more energy */
     double hold;   /* pull that holds the vertices of a copy in its lift, as slide.pull. Without it they go back from
                       where a slide has taken them: with 8 landmarks, eight pairs of 26,000 vertices stay 23 % farther
                       from the truth than on a fourth of the vertices. They stay 15 % farther with 30, 6 % with 300, 5 %
@@ -108,15 +108,15 @@ typedef struct orb_map_params {
     double hopeless; /* energy of a start above which nothing else is tried */
     double alike;    /* energy up to which a map is good on spheres that keep areas: these shapes are alike, or agree in
                         the distances between their landmarks, so less than energy.good can be reached */
-    double walked;   /* energy of all starts above which walks are tried. Maps of two people in other poses have
-                        up to 1.5, and walks led to 0.1 to 0.5 more */
+    double walked;   /* energy of the first start, drawn, above which walks are tried. Maps of two people in other poses
+                        have up to 1.5, and walks led to 0.1 to 0.5 more */
     double folded; /* the first start begins on a coarser level if clearing flips raises the energy of its first one by
                       more than this factor. With 1.25 to 1.32 three pairs of people came to 1.06 to 1.13 from it, two
                       of them to 1.10 and 1.25 from a coarser one; with 1.38 to 1.54 two pairs came to 1.22 to 1.88, and
                       to 1.14 to 1.23 from a coarser one */
     double crumpled;    /* energy of the first start up to which it is drawn at once */
     double drawn;       /* energy above which the map is not drawn: it stays caught */
-    double passed;      /* energy of the map above which passes follow: always with `quality`, else never (targets.c) */
+    int passes;         /* 1: passes follow (targets.c) */
     double gain;        /* a map is drawn again if the first draw has brought the energy below this share. In 38 runs of
                            people, animals of both halves and others, the second draw gained at most 0.1 % after a smaller
                            gain (23 runs), and up to 4 % after a larger one. With `quality` it always is */
