@@ -10,6 +10,10 @@ namespace {
 /* Compressed meshes are 3 to 30 times smaller; a run of equal bytes may be much more. */
 const size_t GROWTH_MAX = 200, SMALL = 1u << 20;
 
+/* What Draco takes while it decodes: the largest table of its entropy coder (2^20 entries of 4 bytes), which a
+ * primitive of any size may ask for, and for each byte. */
+const size_t DRACO_TABLE = 4u << 20, DRACO_A_BYTE = 64;
+
 const cJSON *extension_of(const cJSON *object, const char *name) {
   return member(member(object, "extensions"), name);
 }
@@ -109,6 +113,9 @@ void Packed::load_view(int64_t index, const cJSON *extension, Bytes bytes) {
 
 /* https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_draco_mesh_compression */
 void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSON *extension, Bytes bytes) {
+  /* Draco's memory is not charged to the context; a block of that size, never touched, stands for it. */
+  Octets reserve{Charged<unsigned char>(ctx_)};
+  reserve.reserve(DRACO_TABLE + DRACO_A_BYTE * bytes.size);
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char *>(bytes.at), bytes.size);
   draco::Decoder decoder;

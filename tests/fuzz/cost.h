@@ -15,7 +15,7 @@
 static const double FUZZ_SLOWER = 60;
 
 /* Of a document that is read, changed and read again: bytes of memory for each of its bytes, and beside them. */
-enum { DOCUMENT_BYTES = 1000, DOCUMENT_AT_LEAST = 4 << 20 };
+enum { DOCUMENT_BYTES = 1000, DOCUMENT_AT_LEAST = 8 << 20 };
 
 /* Heap that a budget need not count: of what runs beside the reader, and for each byte of the input, of the target. */
 enum { HEAP_BESIDE = 1 << 20, HEAP_A_BYTE = 128 };
