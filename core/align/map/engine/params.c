@@ -41,7 +41,6 @@ static const orb_map_params DEFAULTS = {
                 .folded = 1.35,
                 .crumpled = 4.5,
                 .drawn = 2,
-
                 .gain = 0.99,
                 .contested = 1.25,
                 .asked_first = 1.35},
