@@ -39,7 +39,8 @@ static void hold(orb_context *ctx, const orb_align_shape shapes[2], outcome *out
   assert_int_equal(orb_match_find(ctx, shapes[0].mesh, shapes[1].mesh, NULL, 1, &out->match), ORB_OK);
   assert_true(orb_contest_is_open(&out->match, 1));
   assert_false(orb_contest_is_open(&out->match, 0));
-  assert_int_equal(orb_contest_run(ctx, &out->match, ORB_PRESET_DEFAULT, &out->alignment, &out->won), ORB_OK);
+  assert_int_equal(orb_contest_run(ctx, &out->match, 0, INFINITY, ORB_PRESET_DEFAULT, &out->alignment, &out->won),
+                   ORB_OK);
   orb_even_shapes_free(ctx, &even);
 }
 
@@ -113,7 +114,114 @@ static void limbs_go_to_limbs(void **unused) {
   assert_contest(1);
 }
 
+/* Two creatures, of which one has long limbs, on rotated spheres, with the tips of their limbs as landmarks. */
+typedef struct marked {
+  orb_mesh mesh[2];
+  orb_embedding embedding[2];
+  orb_even_shapes even;
+  orb_alignment alignment;
+  orb_match match;
+} marked;
+
+static void marked_open(orb_context *ctx, int lean, marked *m) {
+  static const double reach[2][LIMBS] = {{6, 5, 4, 3}, {1.6, 1.8, 1.4, 1.3}};
+  orb_landmark landmarks[LIMBS];
+  orb_place at[LIMBS][2];
+  int32_t tip[2][LIMBS];
+  orb_align_shape shapes[2];
+  orb_embed_options embed;
+  orb_align_options options;
+  orb_embed_defaults(&embed);
+  orb_align_defaults(&options);
+  options.method = ORB_ALIGN_ROTATE;
+  memset(m, 0, sizeof *m);
+  for (int s = 0; s < 2; s++) {
+    m->mesh[s] = shape_creature(ctx, LIMBS, limb, reach[s == lean ? 0 : 1], 4);
+    assert_int_equal(orb_embed(ctx, &m->mesh[s], &embed, &m->embedding[s]), ORB_OK);
+    shapes[s] = (orb_align_shape){&m->mesh[s], m->embedding[s].points};
+    for (int i = 0; i < LIMBS; i++) {
+      tip[s][i] = shape_farthest(&m->mesh[s], limb[i]);
+      assert_int_equal(orb_place_of_vertex(ctx, &m->mesh[s], tip[s][i], &at[i][s]), ORB_OK);
+    }
+  }
+  for (int i = 0; i < LIMBS; i++) {
+    landmarks[i] = (orb_landmark){.at = at[i], .confidence = 1, .weight = 1};
+  }
+  assert_int_equal(orb_even_shapes_create(ctx, shapes, 2, &m->even), ORB_OK);
+  assert_int_equal(orb_align(ctx, m->even.shapes, 2, landmarks, LIMBS, &options, &m->alignment), ORB_OK);
+  const orb_match_hint hint = {.count = LIMBS,
+                               .few = LIMBS,
+                               .trusted = LIMBS,
+                               .first = tip[0],
+                               .second = tip[1],
+                               .stretch = INFINITY,
+                               .sure = INFINITY};
+  assert_int_equal(orb_match_find(ctx, &m->mesh[0], &m->mesh[1], &hint, 1, &m->match), ORB_OK);
+  assert_true(orb_contest_is_open(&m->match, 1));
+}
+
+static void marked_close(orb_context *ctx, marked *m) {
+  orb_alignment_free(ctx, &m->alignment);
+  orb_match_free(ctx, &m->match);
+  orb_even_shapes_free(ctx, &m->even);
+  for (int s = 0; s < 2; s++) {
+    orb_embedding_free(ctx, &m->embedding[s]);
+    shape_free(ctx, &m->mesh[s]);
+  }
+}
+
+/* Holds a contest of two creatures in which a map of no energy is known, and a contest in which none is. */
+static void hold_marked(orb_context *ctx, int lean, marked *m) {
+  orb_contest_result won;
+  double *given[2];
+  marked_open(ctx, lean, m);
+  assert_int_equal(m->match.moves, lean);
+  for (int s = 0; s < 2; s++) {
+    const size_t size = 3 * (size_t)m->mesh[s].vertex_count * sizeof(double);
+    given[s] = test_malloc(size);
+    memcpy(given[s], m->alignment.shapes[s].points, size);
+  }
+  assert_int_equal(orb_contest_run(ctx, &m->match, LIMBS, 1, ORB_PRESET_DEFAULT, &m->alignment, &won), ORB_OK);
+  assert_true(isinf(m->alignment.energy) && isinf(won.loose));
+  for (int s = 0; s < 2; s++) {
+    assert_memory_equal(m->alignment.shapes[s].points, given[s], 3 * (size_t)m->mesh[s].vertex_count * sizeof(double));
+    test_free(given[s]);
+  }
+  assert_int_equal(orb_contest_run(ctx, &m->match, LIMBS, INFINITY, ORB_PRESET_DEFAULT, &m->alignment, &won), ORB_OK);
+  assert_true(won.loose >= 1 && isfinite(won.loose) && isfinite(m->alignment.energy));
+  check_alignment(&m->alignment, 1);
+  assert_tips(m->mesh, &m->alignment);
+}
+
+/* Landmarks meet, whichever shape has the long limbs. A map that is known to have less energy than any walk wins: the
+ * spheres stay. Both spheres have the same bytes for any number of threads. */
+static void landmarks_meet(void **unused) {
+  (void)unused;
+  for (int lean = 0; lean < 2; lean++) {
+    double *first[2] = {NULL, NULL};
+    for (int threads = 1; threads <= 2; threads++) {
+      const orb_context_options options = {.threads = threads};
+      orb_context *ctx;
+      marked m;
+      assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+      hold_marked(ctx, lean, &m);
+      for (int s = 0; s < 2; s++) {
+        const size_t size = 3 * (size_t)m.mesh[s].vertex_count * sizeof(double);
+        if (threads == 1) {
+          first[s] = test_malloc(size);
+          memcpy(first[s], m.alignment.shapes[s].points, size);
+        }
+        assert_memory_equal(m.alignment.shapes[s].points, first[s], size);
+      }
+      marked_close(ctx, &m);
+      orb_context_destroy(ctx);
+    }
+    test_free(first[0]);
+    test_free(first[1]);
+  }
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(landmarks_meet)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -248,6 +248,10 @@ static void landmarks_are_tried(void **state) {
     if (wrong) {
       assert_null(s.coarse.survey[0].tree);
       assert_null(s.coarse.survey[1].tree);
+      assert_int_equal(orb_trials_make(&s.coarse), ORB_OK); /* takes its place */
+      assert_true(s.coarse.count > 0);
+      assert_null(s.coarse.trial[0].own[0]);
+      assert_true(s.coarse.trial[0].cost < INFINITY); /* not dropped */
     } else {
       assert_limbs(&s.coarse);
     }

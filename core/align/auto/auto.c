@@ -183,7 +183,7 @@ static orb_status pin_poor(orb_context *ctx, const orb_align_shape *shapes, cons
 static orb_status hold_contest(orb_context *ctx, matches *m, const orb_align_options *options,
                                orb_alignment *alignment) {
   orb_contest_result won;
-  ORB_TRY(orb_contest_run(ctx, &m->of[1], options->preset, alignment, &won));
+  ORB_TRY(orb_contest_run(ctx, &m->of[1], 0, INFINITY, options->preset, alignment, &won));
   return won.is_second ? choose_other(ctx, m, 0, NULL, won.clear) : ORB_OK;
 }
 

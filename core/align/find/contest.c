@@ -17,11 +17,12 @@ typedef struct contest {
   const orb_match *match;
   orb_alignment *alignment;
   orb_preset preset;
+  int32_t landmark_count;
   double *target[MOST]; /* of the matches */
   orb_map_draft *draft[MOST];
   double energy[MOST];        /* of walks, then of finished maps; INFINITY: not walked, or none leads to a map */
   double walked[MOST];        /* of walks alone */
-  double known;               /* energy of the best walk of an earlier round, or INFINITY */
+  double known;               /* the least energy of the caller's map and of walks of earlier rounds, or INFINITY */
   int32_t round[MOST], count; /* those that walk, and later those that are finished, side by side */
 } contest;
 
@@ -48,8 +49,8 @@ static orb_status walk(orb_context *ctx, void *arg, int32_t i) {
   if (!c->target[n]) {
     return ORB_OK;
   }
-  return orb_map_draft_create(ctx, &shapes[1 - moving], &shapes[moving], c->target[n], c->known, c->preset,
-                              &c->draft[n], &c->energy[n]);
+  return orb_map_draft_create(ctx, &shapes[1 - moving], &shapes[moving], c->landmark_count, c->target[n], c->known,
+                              c->preset, &c->draft[n], &c->energy[n]);
 }
 
 /* The contestant of least energy but for `omit`, or −1. */
@@ -69,8 +70,8 @@ static orb_status walk_all(orb_context *ctx, contest *c) {
   c->round[1] = TURNED;
   c->count = first_may_move(c) ? 2 : 1;
   ORB_TRY(orb_tasks_run(ctx, c->count, walk, c));
-  c->known = fmin(c->energy[MATCH], c->energy[TURNED]);
-  if (c->known <= ORB_FIND_CONTEST_POOR || c->match->other_count == 0 ||
+  c->known = fmin(c->known, fmin(c->energy[MATCH], c->energy[TURNED]));
+  if (c->landmark_count > 0 || c->known <= ORB_FIND_CONTEST_POOR || c->match->other_count == 0 ||
       c->match->other[0].cost > ORB_FIND_CONTEST_BEHIND) {
     return ORB_OK;
   }
@@ -123,18 +124,23 @@ static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *
   if (winner == SECOND) {
     out->clear = lead_of_second(c);
   }
-  return orb_map_draft_take(ctx, c->draft[winner], &c->alignment->energy);
+  return orb_map_draft_take(ctx, c->draft[winner], &c->alignment->energy, &out->loose);
 }
 
-orb_status orb_contest_run(orb_context *ctx, const orb_match *match, orb_preset preset, orb_alignment *alignment,
-                           orb_contest_result *out) {
-  contest c = {.match = match, .alignment = alignment, .preset = preset, .known = INFINITY};
+orb_status orb_contest_run(orb_context *ctx, const orb_match *match, int32_t landmark_count, double known,
+                           orb_preset preset, orb_alignment *alignment, orb_contest_result *out) {
+  contest c = {
+      .match = match, .alignment = alignment, .preset = preset, .landmark_count = landmark_count, .known = known};
   orb_status status;
-  *out = (orb_contest_result){0};
+  *out = (orb_contest_result){.loose = INFINITY};
   for (int32_t n = 0; n < MOST; n++) {
     c.energy[n] = INFINITY;
   }
   ORB_GO(status, walk_all(ctx, &c), end);
+  if (known < INFINITY && !(c.known < known)) {
+    alignment->energy = INFINITY;
+    goto end;
+  }
   ORB_GO(status, finish_best(ctx, &c), end);
   status = take_winner(ctx, &c, out);
 end:

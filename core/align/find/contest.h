@@ -15,10 +15,11 @@
 #include "orbmorph/alignment.h"
 #include "orbmorph/remesh.h"
 
-/* What has won. All 0: the match. clear counts for another match. */
+/* What has won. is_second 0: the match, and clear does not count. */
 typedef struct orb_contest_result {
   int is_second; /* the next best match */
   double clear;  /* how clearly it has won, 0 to 1 */
+  double loose;  /* the energy of its map before that is fitted in space; INFINITY: nothing has won */
 } orb_contest_result;
 
 /* Is a contest worth it? The spheres must keep angles. */
@@ -26,8 +27,11 @@ int orb_contest_is_open(const orb_match *match, int keep_angles);
 
 /* Composes an alignment of two rotated spheres that keep angles towards what wins, and fills alignment->energy.
  * match->moves says which shape moves if only one can: a first shape that is large stays, since it is no copy
- * (align.c). */
-ORB_MUST_CHECK orb_status orb_contest_run(orb_context *ctx, const orb_match *match, orb_preset preset,
-                                          orb_alignment *alignment, orb_contest_result *out);
+ * (align.c). landmark_count: landmarks of the alignment, which meet in every walk; with them the next best match does
+ * not walk. known: the energy of another map of all vertices, or INFINITY. If no walk has less on its coarse level,
+ * nothing wins, and the alignment stays as it is but for its energy, INFINITY. */
+ORB_MUST_CHECK orb_status orb_contest_run(orb_context *ctx, const orb_match *match, int32_t landmark_count,
+                                          double known, orb_preset preset, orb_alignment *alignment,
+                                          orb_contest_result *out);
 
 #endif

@@ -44,7 +44,7 @@ void orb_hint_places_free(orb_context *ctx, orb_hint_places *places) {
   memset(places, 0, sizeof *places);
 }
 
-orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *places, const orb_mesh *copy,
+orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *places, const orb_mesh *copy, int s,
                                    orb_elastic_anchor **out) {
   *out = ORB_NEW(ctx, orb_elastic_anchor, places->count);
   if (!*out) {
@@ -52,10 +52,10 @@ orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *plac
   }
   for (int32_t i = 0; i < places->count; i++) {
     orb_elastic_anchor *one = *out + i;
-    const double *at = places->at[1] + 3 * (size_t)i;
+    const double *at = places->at[s] + 3 * (size_t)i;
     one->vertex = nearest_vertex(copy, at);
     orb_sub(at, copy->positions + 3 * (size_t)one->vertex, one->offset);
-    memcpy(one->place, places->at[0] + 3 * (size_t)i, sizeof one->place);
+    memcpy(one->place, places->at[1 - s] + 3 * (size_t)i, sizeof one->place);
   }
   return ORB_OK;
 }

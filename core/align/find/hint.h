@@ -11,8 +11,8 @@ typedef struct orb_match_hint {
   int32_t count, few; /* the first `few` of them exclude maps; all of them draw the best map to their partners */
   int32_t trusted;    /* the first of them that may make a map: no soft ones, if there are enough others */
   const int32_t *first, *second;
-  double stretch; /* orb_hint_stretch() above which the shapes are not one body in two poses */
-  double sure;    /* orb_hint_stretch() up to which they are; between the two, the bend of the best match decides */
+  double stretch; /* orb_hint_stretch() above which no match is looked for */
+  double sure;    /* orb_hint_stretch() up to which a match is taken; between the two, its bend decides */
 } orb_match_hint;
 
 /* The hint on scaled coarse copies of the shapes. */
@@ -28,10 +28,9 @@ ORB_MUST_CHECK orb_status orb_hint_places_create(orb_context *ctx, int32_t count
                                                  double *at[2], const orb_coarse_copy copy[2], orb_hint_places *out);
 void orb_hint_places_free(orb_context *ctx, orb_hint_places *places);
 
-/* The landmarks as anchors of a copy of the second shape, of any size, on the first one. The caller frees them. O(count
- * · n). */
+/* The landmarks as anchors of a copy of shape s, of any size, on the other one. The caller frees them. O(count · n). */
 ORB_MUST_CHECK orb_status orb_hint_anchors_create(orb_context *ctx, const orb_hint_places *places, const orb_mesh *copy,
-                                                  orb_elastic_anchor **out);
+                                                  int s, orb_elastic_anchor **out);
 
 /* Distances along copy s from each of the first `sources` landmarks to all vertices: sources × vertices of `mesh`,
  * which is that of the copy. O(sources · n log n). */

@@ -79,27 +79,25 @@ static orb_status write_ranking(const orb_trials *t, orb_match *out) {
   return write_pairs(t, best, &out->pairs);
 }
 
-/* Registers a trial's second copy again with the landmarks as anchors. Until here landmarks only excluded maps, since
+/* Registers copy s of a trial again with the landmarks as anchors. Until here landmarks only excluded maps, since
  * anchors would draw a wrong map to their partners as well. If the anchors bend the copy far more than before, they
  * have twisted a limb or the waist; then the pose without them stays until it settles. */
-static orb_status draw_to_landmarks(orb_context *ctx, const orb_trials *t, orb_trial *one) {
-  const orb_mesh *copy = &t->copy[1].mesh;
+static orb_status draw_to_landmarks(orb_context *ctx, const orb_trials *t, orb_trial *one, int s) {
+  const orb_mesh *copy = &t->copy[s].mesh;
   orb_elastic_anchor *anchors = NULL;
   orb_elastic_pose drawn = {NULL, NULL};
   double bend;
   orb_status status;
-  if (t->hint.count == 0) {
-    return ORB_OK;
-  }
-  ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, copy, &anchors), end);
+  ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, copy, s, &anchors), end);
   ORB_GO(status, orb_trial_pose_create(ctx, copy, &drawn), end);
   const orb_elastic_anchors held = {t->hint.count, anchors};
-  ORB_GO(status,
-         orb_elastic_register(ctx, copy, &t->copy[0].mesh, &t->survey[1].around, &one->map[1], &held, &drawn, &bend),
-         end);
-  if (bend <= ORB_FIND_DRAWN_BEND * one->bend[1]) {
-    const orb_elastic_pose before = one->pose[1];
-    one->pose[1] = drawn;
+  ORB_GO(
+      status,
+      orb_elastic_register(ctx, copy, &t->copy[1 - s].mesh, &t->survey[s].around, &one->map[s], &held, &drawn, &bend),
+      end);
+  if (bend <= ORB_FIND_DRAWN_BEND * one->bend[s]) {
+    const orb_elastic_pose before = one->pose[s];
+    one->pose[s] = drawn;
     drawn = before;
   }
 end:
@@ -108,8 +106,7 @@ end:
   return status;
 }
 
-/* Settles the fine copy of shape s on that of the other one, and carries its pose to all vertices. Landmarks draw the
- * second shape only. */
+/* Settles the fine copy of shape s on that of the other one, and carries its pose to all vertices. */
 static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial *one, int s, double **target) {
   const orb_mesh *fine = &t->fine[s].mesh, *mesh = t->mesh[s];
   const orb_trial_scaling *own = &t->scaling[s], *other = &t->scaling[1 - s];
@@ -124,9 +121,9 @@ static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial
     goto end;
   }
   ORB_GO(status, orb_trial_pose_create(ctx, fine, &pose), end);
-  if (s == 1) {
-    ORB_GO(status, draw_to_landmarks(ctx, t, one), end);
-    ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, fine, &anchors), end);
+  if (t->hint.count > 0) {
+    ORB_GO(status, draw_to_landmarks(ctx, t, one, s), end);
+    ORB_GO(status, orb_hint_anchors_create(ctx, &t->hint, fine, s, &anchors), end);
     held = (orb_elastic_anchors){t->hint.count, anchors};
   }
   ORB_GO(status, orb_elastic_carry(ctx, &t->copy[s].mesh, &one->pose[s], fine->positions, fine->vertex_count, &pose),
@@ -184,7 +181,7 @@ static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *s
   return orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch);
 }
 
-/* Does a trial show one body in two poses? If it does not, other starts lead to better maps. */
+/* Are the shapes as much alike under a trial as the hint demands? */
 static int is_one_shape(const orb_trial *one, const orb_match_hint *hint, double stretch) {
   return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
 }
@@ -238,7 +235,8 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   if (hint) {
     ORB_TRY(take_hint(t, hint, &stretch));
   }
-  if (hint && !(stretch <= hint->stretch)) {
+  if (hint && !(stretch <= hint->stretch && stretch < INFINITY)) {
+    out->is_unlike = stretch < INFINITY;
     return ORB_OK;
   }
   double bend;

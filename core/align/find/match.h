@@ -59,8 +59,9 @@ typedef struct orb_match_other {
 typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_match {
-  int is_found;  /* 0: a shape has too few vertices, or no map was found; only is_unsure is filled then */
+  int is_found; /* 0: a shape has too few vertices, or no map was found; only is_unsure and is_unlike are filled then */
   int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
+  int is_unlike; /* 1: no map was looked for, since distances between landmarks differ by more than the hint allows */
   double bend;   /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
   double cost;   /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space, times 1 +
                     ORB_FIND_ASYMMETRY_COST for each unit of its asymmetry (mirrored.h) */
@@ -78,19 +79,19 @@ typedef struct orb_match {
   orb_trials *trials; /* the candidates, for the functions below */
 } orb_match;
 
-/* hint: NULL, or landmarks. With landmarks, a match is found only if they show that the shapes are one body in two
- * poses. Only maps that take the first few landmarks near their partners count; the targets then take all landmarks
- * there. walks: landmark walks lead to the map of shapes that bend much; they need samples of the targets only, so
- * these come from coarser copies; and two shapes that bend are searched for a part, which takes another 0.1 s. Free
- * `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on all threads, and the result has the
- * same bytes for any number of them. */
+/* hint: NULL, or landmarks. With landmarks, a match is found only if the shapes are as much alike as the hint demands.
+ * Only maps that take the first few landmarks near their partners count; the targets
+ * then take all landmarks there. walks: landmark walks lead to the map of shapes that bend much; they need samples of
+ * the targets only, so these come from coarser copies; and two shapes that bend are searched for a part, which takes
+ * another 0.1 s. Free `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on all threads, and
+ * the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, int walks, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
- * other[n − 1]. moving: 0, the first shape, or 1, the second, which alone is drawn to landmarks. *target: the caller's
- * to free, also on failure; NULL if a degenerate shape cannot be registered back, which the best map excludes. The
- * meshes of the match must still exist. Targets of different n may be computed side by side, since each completes its
- * own trial; so may both targets of n 0 without landmarks, since the best trial is complete. About 0.1 s of one thread.
+ * other[n − 1]. moving: 0, the first shape, or 1, the second. Landmarks draw it to their partners. *target: the
+ * caller's to free, also on failure; NULL if a degenerate shape cannot be registered back, which the best map excludes.
+ * The meshes of the match must still exist. Targets of different n may be computed side by side, since each completes
+ * its own trial; so may both targets of n 0, since the best trial is complete. About 0.1 s of one thread.
  */
 ORB_MUST_CHECK orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving,
                                            double **target);

@@ -104,6 +104,7 @@ void orb_trial_free(orb_context *ctx, orb_trial *one) {
     orb_trial_pose_free(ctx, &one->pose[s]);
     orb_free(ctx, one->own[s]);
   }
+  memset(one, 0, sizeof *one); /* another trial may take its place */
 }
 
 orb_status orb_trial_create(orb_context *ctx, const orb_trials *t, orb_trial *out) {
