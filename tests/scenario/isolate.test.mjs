@@ -220,8 +220,8 @@ function told(pid, signal) {
 }
 
 /**
- * Asks for a profile of an asset, and sends a signal to the process that makes it. If the profile is made before the
- * signal arrives, deletes the supermesh, makes it again and tries again.
+ * Asks for a profile of an asset, and sends a signal to the process that makes it. If the process has sent the profile
+ * before the signal arrives, deletes the supermesh, makes it again and tries again.
  */
 async function convert(d, ids, signal, options) {
   for (let tries = 0; tries < 20; tries++) {
@@ -233,8 +233,9 @@ async function convert(d, ids, signal, options) {
     for (let over = false; !over; ) {
       const [pid] = workers(d);
       if (pid && told(pid, signal)) {
-        const ended = await Promise.race([reply.then(() => true), sleep(300)]);
-        if (signal !== 'SIGSTOP' || !ended) return { url, pid, reply };
+        const hangs = signal === 'SIGSTOP' && !(await Promise.race([reply.then(() => true), sleep(300)]));
+        const died = signal !== 'SIGSTOP' && (await reply).status !== 200;
+        if (hangs || died) return { url, pid, reply };
       }
       over = await Promise.race([reply.then(() => true), sleep(1)]);
     }
