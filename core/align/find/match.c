@@ -239,8 +239,10 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     out->is_unlike = stretch < INFINITY;
     return ORB_OK;
   }
-  double bend;
-  ORB_TRY(orb_trials_try_hinted(t, &bend));
+  double bend = INFINITY;
+  if (stretch <= ORB_FIND_HINT_STRETCH_MOST) { /* above, the trial of landmarks would bend the shapes too much */
+    ORB_TRY(orb_trials_try_hinted(t, &bend));
+  }
   if (hint && stretch > hint->sure && isfinite(bend) && bend > ORB_FIND_HINTED_UNLIKE) {
     out->is_unsure = 1;
     return ORB_OK;

@@ -57,7 +57,8 @@ static int32_t list_landmarks(const orb_landmark *landmarks, const orb_alignment
 
 /* The result of a match before anything is pinned. */
 typedef struct posed {
-  orb_alignment alignment; /* empty, unless it is found */
+  orb_alignment alignment; /* empty, unless it is found or waits for a second try */
+  int keeps_angles;        /* its spheres do */
   double worst, loose;     /* the largest energy of its maps, and the mean, before they are fitted in space */
   int is_found;
   int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body, */
@@ -268,7 +269,8 @@ static orb_status compose_to_all(two_ways *c, double sure, int keeps_angles) {
   return status;
 }
 
-static orb_status compose_all_posed(two_ways *c, double sure) {
+/* Rotates the spheres onto each other: the given ones if they are alike then, or else spheres that keep angles. */
+static orb_status rotate_posed(two_ways *c) {
   orb_context *ctx = c->ctx;
   posed *p = &c->posed;
   orb_align_options rotated = *c->options;
@@ -280,30 +282,33 @@ static orb_status compose_all_posed(two_ways *c, double sure) {
          orb_align_by_method(ctx, c->shapes, c->shape_count, c->landmarks, c->landmark_count, &rotated, &p->alignment),
          end);
   ORB_GO(status, orb_align_are_alike(ctx, &p->alignment, rotated.preset, &alike), end);
+  p->keeps_angles = !alike;
   if (!alike) {
     orb_alignment_free(ctx, &p->alignment);
     ORB_GO(status, orb_even_shapes_create(ctx, c->shapes, c->shape_count, &even), end);
-    ORB_GO(
-        status,
-        orb_align_by_method(ctx, even.shapes, c->shape_count, c->landmarks, c->landmark_count, &rotated, &p->alignment),
-        end);
+    status =
+        orb_align_by_method(ctx, even.shapes, c->shape_count, c->landmarks, c->landmark_count, &rotated, &p->alignment);
   }
-  status = compose_to_all(c, sure, !alike);
 end:
   orb_even_shapes_free(ctx, &even);
   return status;
 }
 
-/* Aligns shapes by their matches. The map starts on spheres that keep angles, as without landmarks.
- * Pins would distort them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold
- * the surface between them. sure: that of orb_match_hint. Nothing is found if the shapes are less alike, if
- * there is no map, or if such a sphere has no room for a landmark; pins can meet if the given sphere has room. */
+/* Aligns shapes by their matches. The map starts on spheres that keep angles, as without landmarks. Pins would distort
+ * them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold the surface between
+ * them. sure: that of orb_match_hint. Nothing is found if the shapes are less alike, if there is no map, or if such a
+ * sphere has no room for a landmark; pins can meet if the given sphere has room. Two shapes that were only compared
+ * stay rotated, for a second try. */
 static orb_status try_pose(two_ways *c, double sure) {
   posed *p = &c->posed;
-  memset(p, 0, sizeof *p);
-  orb_status status = compose_all_posed(c, sure);
+  *p = (posed){.alignment = p->alignment, .keeps_angles = p->keeps_angles};
+  orb_status status = p->alignment.shapes ? ORB_OK : rotate_posed(c);
+  if (status == ORB_OK) {
+    status = compose_to_all(c, sure, p->keeps_angles);
+  }
   p->is_found = status == ORB_OK && p->worst < INFINITY;
-  if (!p->is_found) {
+  const int may_wait = status == ORB_OK && c->shape_count == 2 && (p->is_unsure || p->is_unlike);
+  if (!p->is_found && !may_wait) {
     posed_free(c->ctx, p);
   }
   return orb_alignment_lacks_room(c->ctx, status) ? ORB_OK : status;
