@@ -27,6 +27,19 @@ typedef struct outcome {
   orb_match match;
 } outcome;
 
+/* Makes and embeds two creatures. lean: the number of the one with long limbs. */
+static void make_creatures(orb_context *ctx, int lean, orb_mesh mesh[2], orb_embedding embedding[2],
+                           orb_align_shape shapes[2]) {
+  static const double reach[2][LIMBS] = {{6, 5, 4, 3}, {1.6, 1.8, 1.4, 1.3}};
+  orb_embed_options embed;
+  orb_embed_defaults(&embed);
+  for (int s = 0; s < 2; s++) {
+    mesh[s] = shape_creature(ctx, LIMBS, limb, reach[s == lean ? 0 : 1], 4);
+    assert_int_equal(orb_embed(ctx, &mesh[s], &embed, &embedding[s]), ORB_OK);
+    shapes[s] = (orb_align_shape){&mesh[s], embedding[s].points};
+  }
+}
+
 /* Holds a contest between two embedded shapes. */
 static void hold(orb_context *ctx, const orb_align_shape shapes[2], outcome *out) {
   orb_even_shapes even;
@@ -63,7 +76,6 @@ static void assert_tips(const orb_mesh mesh[2], const orb_alignment *alignment) 
 /* Limbs of other lengths go to their counterparts, and the sphere has the same bytes for any number of threads. lean:
  * the number of the shape with long limbs. */
 static void assert_contest(int lean) {
-  static const double reach[2][LIMBS] = {{6, 5, 4, 3}, {1.6, 1.8, 1.4, 1.3}};
   static const int threads[] = {1, 2, 5};
   double *first[2] = {NULL, NULL};
   double energy = 0;
@@ -73,15 +85,9 @@ static void assert_contest(int lean) {
     orb_mesh mesh[2];
     orb_embedding embedding[2];
     orb_align_shape shapes[2];
-    orb_embed_options embed;
     outcome out = {0};
     assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
-    orb_embed_defaults(&embed);
-    for (int s = 0; s < 2; s++) {
-      mesh[s] = shape_creature(ctx, LIMBS, limb, reach[s == lean ? 0 : 1], 4);
-      assert_int_equal(orb_embed(ctx, &mesh[s], &embed, &embedding[s]), ORB_OK);
-      shapes[s] = (orb_align_shape){&mesh[s], embedding[s].points};
-    }
+    make_creatures(ctx, lean, mesh, embedding, shapes);
     hold(ctx, shapes, &out);
     assert_int_equal(out.match.moves, lean); /* the one with long limbs */
     check_alignment(&out.alignment, 0);
@@ -124,21 +130,16 @@ typedef struct marked {
 } marked;
 
 static void marked_open(orb_context *ctx, int lean, marked *m) {
-  static const double reach[2][LIMBS] = {{6, 5, 4, 3}, {1.6, 1.8, 1.4, 1.3}};
   orb_landmark landmarks[LIMBS];
   orb_place at[LIMBS][2];
   int32_t tip[2][LIMBS];
   orb_align_shape shapes[2];
-  orb_embed_options embed;
   orb_align_options options;
-  orb_embed_defaults(&embed);
   orb_align_defaults(&options);
   options.method = ORB_ALIGN_ROTATE;
   memset(m, 0, sizeof *m);
+  make_creatures(ctx, lean, m->mesh, m->embedding, shapes);
   for (int s = 0; s < 2; s++) {
-    m->mesh[s] = shape_creature(ctx, LIMBS, limb, reach[s == lean ? 0 : 1], 4);
-    assert_int_equal(orb_embed(ctx, &m->mesh[s], &embed, &m->embedding[s]), ORB_OK);
-    shapes[s] = (orb_align_shape){&m->mesh[s], m->embedding[s].points};
     for (int i = 0; i < LIMBS; i++) {
       tip[s][i] = shape_farthest(&m->mesh[s], limb[i]);
       assert_int_equal(orb_place_of_vertex(ctx, &m->mesh[s], tip[s][i], &at[i][s]), ORB_OK);

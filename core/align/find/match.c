@@ -182,7 +182,7 @@ static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *s
 }
 
 /* Are the shapes as much alike under a trial as the hint demands? */
-static int is_one_shape(const orb_trial *one, const orb_match_hint *hint, double stretch) {
+static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double stretch) {
   return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
 }
 
@@ -254,7 +254,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
     return ORB_OK;
   }
-  out->is_unsure = !is_one_shape(&t->trial[best], hint, stretch);
+  out->is_unsure = !suits_hint(&t->trial[best], hint, stretch);
   if (out->is_unsure) {
     return ORB_OK;
   }

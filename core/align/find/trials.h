@@ -121,7 +121,7 @@ void orb_trial_fill_cost(const orb_trials *trials, orb_trial *one, int direction
 ORB_MUST_CHECK orb_status orb_trial_pose_create(orb_context *ctx, const orb_mesh *mesh, orb_elastic_pose *out);
 void orb_trial_pose_free(orb_context *ctx, orb_elastic_pose *pose);
 
-/* Frees the poses of a trial and its own maps. */
+/* Frees the poses of a trial and its own maps, and empties it. */
 void orb_trial_free(orb_context *ctx, orb_trial *one);
 
 #endif

@@ -137,15 +137,13 @@ typedef struct posed_map {
 /* Shapes that are composed side by side. If one has no map, those after it do not count, and are left out. */
 typedef struct posing {
   two_ways *ways;
-  double sure; /* that of the hint */
-  int keeps_angles;
+  double sure;            /* that of the hint */
   posed_map *map;         /* of each shape but the first */
   atomic_int first_empty; /* the first of them so far that has none; their number: all have one */
 } posing;
 
 /* Follows a match from its targets. Pins compete with it where there are two ways. */
-static orb_status follow_targets(orb_context *ctx, const posing *all, int32_t s, orb_match *match, posed_map *out) {
-  two_ways *c = all->ways;
+static orb_status follow_targets(orb_context *ctx, two_ways *c, int32_t s, orb_match *match, posed_map *out) {
   orb_alignment *a = &c->posed.alignment;
   const int competes = have_two(c), walks_first = competes && match->bend > ORB_FIND_WALKS_FIRST;
   orb_map_course course = {0};
@@ -157,7 +155,7 @@ static orb_status follow_targets(orb_context *ctx, const posing *all, int32_t s,
                                .target = match->target,
                                .aim = aim,
                                .fits_parts = 1,
-                               .keeps_angles = all->keeps_angles,
+                               .keeps_angles = c->posed.keeps_angles,
                                .course = &course,
                                .rival = {competes ? ask_pins : NULL, c},
                                .beat = {.energy = walks_first && c->walked ? c->loose : 0},
@@ -222,8 +220,8 @@ static orb_status compose_posed(orb_context *ctx, const posing *all, int32_t i) 
   out->is_unsure = match.is_unsure;
   out->is_unlike = match.is_unlike;
   if (match.is_found) {
-    status = walks && orb_contest_is_open(&match, all->keeps_angles) ? follow_by_walks(ctx, c, &match, out)
-                                                                     : follow_targets(ctx, all, s, &match, out);
+    status = walks && orb_contest_is_open(&match, c->posed.keeps_angles) ? follow_by_walks(ctx, c, &match, out)
+                                                                         : follow_targets(ctx, c, s, &match, out);
   }
 done:
   orb_match_free(ctx, &match);
@@ -250,10 +248,10 @@ static orb_status compose_unless_empty(orb_context *ctx, void *arg, int32_t i) {
 }
 
 /* Composes the maps to all shapes but the first. */
-static orb_status compose_to_all(two_ways *c, double sure, int keeps_angles) {
+static orb_status compose_to_all(two_ways *c, double sure) {
   posed *p = &c->posed;
   const int32_t count = c->shape_count - 1;
-  posing all = {c, sure, keeps_angles, ORB_NEW0(c->ctx, posed_map, count), count};
+  posing all = {c, sure, ORB_NEW0(c->ctx, posed_map, count), count};
   orb_status status =
       all.map ? orb_align_each(c->ctx, &p->alignment.shapes[0], c->options->preset, count, compose_unless_empty, &all)
               : ORB_E_NO_MEMORY;
@@ -304,7 +302,7 @@ static orb_status try_pose(two_ways *c, double sure) {
   *p = (posed){.alignment = p->alignment, .keeps_angles = p->keeps_angles};
   orb_status status = p->alignment.shapes ? ORB_OK : rotate_posed(c);
   if (status == ORB_OK) {
-    status = compose_to_all(c, sure, p->keeps_angles);
+    status = compose_to_all(c, sure);
   }
   p->is_found = status == ORB_OK && p->worst < INFINITY;
   const int may_wait = status == ORB_OK && c->shape_count == 2 && (p->is_unsure || p->is_unlike);
