@@ -20,7 +20,7 @@
 #include "support_align.h"
 #include "support_shared.h"
 
-enum { TRUE_PLACES = 400, GIVEN = 24, FEW = 8 };
+enum { TRUE_PLACES = 400, GIVEN = 24, FEW = 8, FEWER = 5 };
 
 typedef struct body {
   orb_mesh mesh;
@@ -181,9 +181,9 @@ static void keep_common(const posed_place *place[2], int samples, body bodies[2]
   }
 }
 
-/* The mean errors between two bodies, relative to the diagonal: without landmarks, and with the first FEW true places.
- * Returns the energy with them. */
-static double errors_of(const char *const kind[2], const char *const build[2], const char *const pose[2],
+/* The mean errors between two bodies, relative to the diagonal: without landmarks, and with the first true places,
+ * FEW at most. Returns the energy with them. */
+static double errors_of(const char *const kind[2], const char *const build[2], const char *const pose[2], int few,
                         double error[2]) {
   double energy = 0;
   const int samples = posed_sample_count();
@@ -197,11 +197,11 @@ static double errors_of(const char *const kind[2], const char *const build[2], c
     generate(ctx, kind[s], build[s], pose[s], (unsigned)s + 1, &bodies[s], place[s]);
   }
   keep_common((const posed_place *[2]){place[0], place[1]}, samples, bodies);
-  assert_true(bodies[0].count > 100);
+  assert_true(bodies[0].count > 100 && few <= FEW);
   orb_place at[FEW][2];
   orb_landmark landmarks[FEW];
   memset(landmarks, 0, sizeof landmarks);
-  for (int i = 0; i < FEW; i++) {
+  for (int i = 0; i < few; i++) {
     at[i][0] = bodies[0].truth[i];
     at[i][1] = bodies[1].truth[i];
     landmarks[i].at = at[i];
@@ -215,15 +215,15 @@ static double errors_of(const char *const kind[2], const char *const build[2], c
     options.preset = ORB_PRESET_DEFAULT;
     options.method = given ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
     if (given) {
-      align_and_check(ctx, shapes, 2, landmarks, FEW, &options, &out);
+      align_and_check(ctx, shapes, 2, landmarks, few, &options, &out);
     } else {
       assert_int_equal(orb_align(ctx, shapes, 2, NULL, 0, &options, &out), ORB_OK);
     }
-    error[given] = mean_error(ctx, bodies, FEW, &out);
+    error[given] = mean_error(ctx, bodies, few, &out);
     energy = out.energy;
     orb_alignment_free(ctx, &out);
   }
-  print_message("%s and %s: error without landmarks %.4f, with %d of them %.4f\n", kind[0], kind[1], error[0], FEW,
+  print_message("%s and %s: error without landmarks %.4f, with %d of them %.4f\n", kind[0], kind[1], error[0], few,
                 error[1]);
   free(place[0]);
   free(place[1]);
@@ -236,7 +236,7 @@ static void few_true_landmarks_do_not_spoil_a_match(void **state) {
   (void)state;
   double error[2];
   (void)errors_of((const char *const[2]){"giraffe", "giraffe"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"stand", "run"}, error);
+                  (const char *const[2]){"stand", "run"}, FEW, error);
   assert_true(error[0] <= 0.008);
   assert_true(error[1] <= 1.05 * error[0]);
 }
@@ -250,7 +250,7 @@ static void maps_on_the_given_spheres_slide(void **state) {
 #endif
   double error[2];
   (void)errors_of((const char *const[2]){"person", "person"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"walk", "turn"}, error);
+                  (const char *const[2]){"walk", "turn"}, FEW, error);
   assert_true(error[0] <= 0.006);
   assert_true(error[1] <= 0.006);
 }
@@ -261,11 +261,11 @@ static void landmarks_on_a_part_place_that_part(void **state) {
   (void)state;
   double error[2];
   (void)errors_of((const char *const[2]){"head", "bust"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"stand", "stand"}, error);
+                  (const char *const[2]){"stand", "stand"}, FEW, error);
   assert_true(error[1] <= 0.035);
 #ifndef __SANITIZE_ADDRESS__
   (void)errors_of((const char *const[2]){"bust", "head"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"look", "nod"}, error);
+                  (const char *const[2]){"look", "nod"}, FEW, error);
   assert_true(error[1] <= 0.055);
 #endif
 }
@@ -279,9 +279,22 @@ static void landmarks_of_other_kinds_use_a_match(void **state) {
 #endif
   double error[2];
   const double energy = errors_of((const char *const[2]){"person", "elephant"}, (const char *const[2]){"", ""},
-                                  (const char *const[2]){"walk", "stand"}, error);
+                                  (const char *const[2]){"walk", "stand"}, FEW, error);
   assert_true(energy <= 1.8);
   assert_true(error[1] <= error[0]);
+}
+
+/* Five landmarks, the snout and the feet, leave the trunks of a dog and an elephant open. They alone lead to an error
+ * of 0.043, with an energy that right maps may have. */
+static void few_landmarks_of_other_kinds_use_a_match(void **state) {
+  (void)state;
+#ifdef __SANITIZE_ADDRESS__
+  skip(); /* the contest of creatures runs the same code */
+#endif
+  double error[2];
+  (void)errors_of((const char *const[2]){"dog", "elephant"}, (const char *const[2]){"", ""},
+                  (const char *const[2]){"walk", "stand"}, FEWER, error);
+  assert_true(error[1] <= 0.035);
 }
 
 /* One body is twisted. A match that exchanges left with right and front with back would move places by half a body. */
@@ -358,6 +371,7 @@ int main(void) {
                                      cmocka_unit_test(maps_on_the_given_spheres_slide),
                                      cmocka_unit_test(landmarks_on_a_part_place_that_part),
                                      cmocka_unit_test(landmarks_of_other_kinds_use_a_match),
+                                     cmocka_unit_test(few_landmarks_of_other_kinds_use_a_match),
                                      cmocka_unit_test(a_twist_is_matched),
                                      cmocka_unit_test(distances_tell_a_pose)};
   return cmocka_run_group_tests(tests, NULL, NULL);

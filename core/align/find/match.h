@@ -61,7 +61,8 @@ typedef struct orb_trials orb_trials; /* trials.h */
 typedef struct orb_match {
   int is_found; /* 0: a shape has too few vertices, or no map was found; only is_unsure and is_unlike are filled then */
   int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
-  int is_unlike; /* 1: no map was looked for, since distances between landmarks differ by more than the hint allows */
+  int is_unlike; /* 1: distances between landmarks exclude that the shapes are one body; a map is then only looked for
+                    if the hint allows it */
   double bend;   /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
   double cost;   /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space, times 1 +
                     ORB_FIND_ASYMMETRY_COST for each unit of its asymmetry (mirrored.h) */
