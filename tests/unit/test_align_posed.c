@@ -284,7 +284,7 @@ static void landmarks_of_other_kinds_use_a_match(void **state) {
   assert_true(error[1] <= error[0]);
 }
 
-/* Five landmarks, the snout and the feet, leave the trunks of a dog and an elephant open. They alone lead to an error
+/* Five landmarks, the snout and the feet, leave the bodies of a dog and an elephant open. They alone lead to an error
  * of 0.043, with an energy that right maps may have. */
 static void few_landmarks_of_other_kinds_use_a_match(void **state) {
   (void)state;

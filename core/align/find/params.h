@@ -242,7 +242,8 @@ static const double ORB_FIND_HINT_FAR = 0.5;
 /* If the distances between landmarks differ by more than STRETCH_MOST, as a mean logarithm, the shapes are not one body
  * in two poses: people have 0.03 to 0.24, different animals 0.12 to 0.57. If they differ by more than STRETCH, the
  * match may bend the shapes by BEND at most, unless a landmark walk has come to a poor map: there it bends people by up
- * to 0.13, and different animals by 0.16 and more. */
+ * to 0.13, and different animals by 0.16 and more. So walks follow a match of shapes that are not one body if it bends
+ * them by more than BEND. */
 static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0.25, ORB_FIND_HINT_BEND = 0.15;
 /* If a rough map takes the landmarks farther from their partners than this mean distance, it is another map. In radii
  * of a ball of the shape's area. */

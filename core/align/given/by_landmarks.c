@@ -61,8 +61,8 @@ typedef struct posed {
   int keeps_angles;        /* its spheres do */
   double worst, loose;     /* the largest energy of its maps, and the mean, before they are fitted in space */
   int is_found;
-  int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body, */
-  int is_unlike; /* or because they exclude it */
+  int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body */
+  int is_unlike; /* 1: they exclude it */
 } posed;
 
 static void posed_free(orb_context *ctx, posed *p) {
@@ -295,8 +295,8 @@ end:
 /* Aligns shapes by their matches. The map starts on spheres that keep angles, as without landmarks. Pins would distort
  * them: if a limb is long on one sphere and short on the other, true landmarks at its two ends fold the surface between
  * them. sure: that of orb_match_hint. Nothing is found if the shapes are less alike, if there is no map, or if such a
- * sphere has no room for a landmark; pins can meet if the given sphere has room. Two shapes that were only compared
- * stay rotated, for a second try. */
+ * sphere has no room for a landmark; pins can meet if the given sphere has room. Two shapes for which it finds
+ * nothing because landmarks leave it open or exclude it stay rotated, for a second try. */
 static orb_status try_pose(two_ways *c, double sure) {
   posed *p = &c->posed;
   *p = (posed){.alignment = p->alignment, .keeps_angles = p->keeps_angles};
