@@ -26,11 +26,8 @@ typedef struct contest {
   int32_t round[MOST], count; /* those that walk, and later those that are finished, side by side */
 } contest;
 
-/* Where landmarks show that the shapes are unlike, a match bends them as much as other animals (ORB_FIND_HINT_BEND).
- * Then walks lead to better maps: a person and a dog, whose match bends them by 0.198, come to 1.22 instead of 1.44. */
 int orb_contest_is_open(const orb_match *match, int keep_angles) {
-  const double least = match->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
-  return keep_angles && match->is_found && match->bend > least;
+  return keep_angles && match->is_found && match->bend > match->walks_above;
 }
 
 /* Is the first shape small enough to move? */

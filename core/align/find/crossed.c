@@ -43,7 +43,7 @@ static orb_status cross(orb_context *ctx, void *arg, int32_t i) {
     ORB_GO(status, orb_trial_register(ctx, t, &crossed, s), end);
   }
   for (int s = 0; s < 2; s++) {
-    if (crossed.bend[s] < one->bend[s]) {
+    if (crossed.bend[s] < one->bend[s] && orb_trial_keeps_hint(t, &crossed, s)) {
       const orb_elastic_pose before = one->pose[s];
       one->pose[s] = crossed.pose[s];
       crossed.pose[s] = before;

@@ -104,16 +104,8 @@ static orb_status register_one(orb_context *ctx, void *arg, int32_t s) {
  * arms that lie against a body are registered to it in one direction, but correctly in the other. */
 static orb_status register_both(orb_trials *t, double *bend) {
   orb_trial *one = &t->trial[0];
-  double off = INFINITY;
   ORB_TRY(orb_tasks_run(t->ctx, 2, register_one, t));
-  for (int s = 0; s < 2; s++) {
-    off = fmin(off, orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position));
-  }
-  if (off <= ORB_FIND_HINT_OFF) {
-    orb_trial_fill_cost(t, one, 2);
-  } else {
-    one->cost = one->rough = INFINITY;
-  }
+  orb_trial_fill_cost(t, one, 2);
   *bend = one->cost < INFINITY ? orb_trials_bend(t) : INFINITY;
   return orb_context_check(t->ctx);
 }

@@ -128,7 +128,7 @@ static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial
   }
   ORB_GO(status, orb_elastic_carry(ctx, &t->copy[s].mesh, &one->pose[s], fine->positions, fine->vertex_count, &pose),
          end);
-  const int rounds = (one->bend[0] + one->bend[1]) / 2 > ORB_FIND_WALKS_FIRST ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
+  const int rounds = (one->bend[0] + one->bend[1]) / 2 > t->walks_above ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
   ORB_GO(status, orb_elastic_settle(ctx, fine, &t->fine[1 - s].mesh, &held, rounds, &pose), end);
   for (size_t i = 0; i < count; i++) {
     points[i] = (mesh->positions[i] - own->middle[i % 3]) * own->scale;
@@ -239,6 +239,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     ORB_TRY(take_hint(t, hint, &stretch));
   }
   out->is_unlike = stretch > ORB_FIND_HINT_STRETCH_MOST && stretch < INFINITY;
+  out->walks_above = t->walks_above = out->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
   if (hint && !(stretch <= hint->stretch && stretch < INFINITY)) {
     return ORB_OK;
   }
@@ -268,7 +269,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   if (!hint && walks && out->bend > ORB_FIND_INSET_BENDS) {
     ORB_TRY(orb_inset_find(t, &out->inset));
   }
-  return orb_trials_refine(t, walks && out->bend > ORB_FIND_WALKS_FIRST ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
+  return orb_trials_refine(t, walks && out->bend > out->walks_above ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
 }
 
 orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,

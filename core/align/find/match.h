@@ -63,13 +63,14 @@ typedef struct orb_match {
   int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
   int is_unlike; /* 1: distances between landmarks exclude that the shapes are one body; a map is then only looked for
                     if the hint allows it */
-  double bend;   /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
-  double cost;   /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space, times 1 +
-                    ORB_FIND_ASYMMETRY_COST for each unit of its asymmetry (mirrored.h) */
-  double clear;  /* 0 to 1: how far the next best map that differs is behind */
-  double lead;   /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
-                    half of the cost of the rotation in space and of the asymmetry. About 1 if a shape looks alike from
-                    several sides */
+  double walks_above; /* walks follow the best map if it bends the shapes more than this */
+  double bend;        /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
+  double cost;        /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space, times 1 +
+                         ORB_FIND_ASYMMETRY_COST for each unit of its asymmetry (mirrored.h) */
+  double clear;       /* 0 to 1: how far the next best map that differs is behind */
+  double lead; /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
+                  half of the cost of the rotation in space and of the asymmetry. About 1 if a shape looks alike from
+                  several sides */
   int moves; /* which shape moves where only one does: the second (1), unless the first (0) is clearly less round. Limbs
                 that move stretch to where they go; limbs that stay are left out by the triangles of a round shape */
   orb_match_pairs pairs;

@@ -322,13 +322,18 @@ void orb_trial_images(const orb_trials *t, const orb_trial *one, int s, int32_t 
   orb_survey_images(&t->survey[1 - s], &t->copy[1 - s].mesh, one->pose[s].position, t->copy[s].mesh.vertex_count, out);
 }
 
+int orb_trial_keeps_hint(const orb_trials *t, const orb_trial *one, int s) {
+  return orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) <= ORB_FIND_HINT_OFF;
+}
+
 void orb_trial_fill_cost(const orb_trials *t, orb_trial *one, int directions) {
   const double factor =
       (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0)) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
   const double bend = directions == 2 ? (one->bend[0] + one->bend[1]) / 2 : one->bend[0];
   const int is_known = isfinite(one->bend[0] * factor) && isfinite(bend * factor);
+  const int is_kept = directions == 1 || orb_trial_keeps_hint(t, one, 0) || orb_trial_keeps_hint(t, one, 1);
   one->rough = is_known ? one->bend[0] * factor : INFINITY;
-  one->cost = is_known ? bend * factor : INFINITY;
+  one->cost = is_known && is_kept ? bend * factor : INFINITY;
 }
 
 /* Dropped trials come last, by their rough cost. */
@@ -357,7 +362,7 @@ int orb_trials_bend_much(const orb_trials *t) {
 static void drop_against_hint(orb_trials *t, int s) {
   for (int32_t i = 0; i < t->count; i++) {
     orb_trial *one = &t->trial[i];
-    if (one->cost < INFINITY && orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) > ORB_FIND_HINT_OFF) {
+    if (one->cost < INFINITY && !orb_trial_keeps_hint(t, one, s)) {
       one->cost = one->rough = INFINITY;
     }
   }
@@ -367,8 +372,7 @@ static void drop_against_hint(orb_trials *t, int s) {
 static int any_agrees(const orb_trials *t) {
   int any = 0;
   for (int32_t i = 0; i < t->count; i++) {
-    any |= t->trial[i].cost < INFINITY &&
-           orb_hint_off(&t->hint, &t->copy[0], 0, t->trial[i].pose[0].position) <= ORB_FIND_HINT_OFF;
+    any |= t->trial[i].cost < INFINITY && orb_trial_keeps_hint(t, &t->trial[i], 0);
   }
   return any;
 }

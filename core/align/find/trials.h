@@ -48,6 +48,7 @@ typedef struct orb_trials {
   orb_coarse_copy fine[2];        /* the same with more vertices, on which matches are settled; empty before
                                      orb_trials_refine() */
   int32_t fine_size;              /* vertices of these */
+  double walks_above;             /* as in orb_match */
   orb_hint_places hint;           /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
   orb_spectral_dense dense;       /* the spectral maps */
   int32_t *rotated[2];            /* the maps of the rotations, one after the other, laid out as in `dense` */
@@ -114,7 +115,11 @@ ORB_MUST_CHECK orb_status orb_trial_register(orb_context *ctx, const orb_trials 
 /* The vertices of the other copy on which pose s takes those of copy s. */
 void orb_trial_images(const orb_trials *trials, const orb_trial *one, int s, int32_t *out);
 
-/* Sets the cost of a trial by the first direction or by both, which must have been registered. */
+/* Whether pose s of a trial takes the first few landmarks to their partners. */
+int orb_trial_keeps_hint(const orb_trials *trials, const orb_trial *one, int s);
+
+/* Sets the cost of a trial by the first direction or by both, which must have been registered. By both, it drops a
+ * trial neither of whose poses takes the landmarks to their partners. */
 void orb_trial_fill_cost(const orb_trials *trials, orb_trial *one, int directions);
 
 /* Room for a pose of a mesh; free it in any case. */
