@@ -2,9 +2,10 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
+import { readOff, vertexBeside } from '../scenario/support/misplaced.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
-import { landmarks, startOccupied } from './steps.mjs';
+import { landmarks, morph, startOccupied } from './steps.mjs';
 import { countPixels } from './pictures.mjs';
 import {
   addFiles,
@@ -194,5 +195,51 @@ test('a search for landmarks survives a reload as itself, and can be stopped', a
   const search = jobs.find(({ kind }) => kind === 'supermesh');
   await until(async () => (await json(busy.url, search.url)).state === 'cancelled', 'its job, too');
   assert.equal(await page.evaluate(() => document.activeElement.textContent), 'Find them for me', 'the focus stays');
+  await done();
+});
+
+test('a landmark that may be misplaced moves to where it would lie, and back', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  const { landmarks: given } = JSON.parse(await readFile(sample('dog-giraffe.json'), 'utf8'));
+  given[0].at[1] = { vertex: vertexBeside(readOff(await readFile(sample('giraffe.off'), 'utf8')), given, 0) };
+  await button(page, 'Landmarks').click();
+  await page.getByLabel('Landmark file').setInputFiles({
+    name: 'moved.json',
+    mimeType: 'application/json',
+    buffer: Buffer.from(JSON.stringify({ landmarks: given })),
+  });
+  await counted(landmarks(page), given.length, 'the landmarks are read');
+  await morph(page);
+  const suspects = page.getByRole('list', { name: 'Landmarks that may be misplaced' });
+  await until(() => suspects.count(), 'the landmark is named');
+  assert.match(
+    await suspects.textContent(),
+    new RegExp(`^${given[0].name} may be misplaced: .* diagonal away. Move it there$`),
+  );
+  const places = async () => {
+    const [download] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
+    return JSON.parse(await readFile(await download.path(), 'utf8')).landmarks.map(({ at }) => at);
+  };
+
+  await button(page, 'Move it there').click();
+  await until(() => button(page, 'Export').count(), 'the landmarks are shown');
+  const [moved, ...others] = await places();
+  assert.deepEqual(moved[0], given[0].at[0]);
+  assert.ok(Number.isInteger(moved[1].triangle), 'the nose lies where the answer says');
+  assert.deepEqual(
+    others,
+    given.slice(1).map(({ at }) => at),
+  );
+  await button(page, 'Undo').click();
+  assert.deepEqual((await places())[0], given[0].at);
+
+  await button(page, 'Delete landmark 1', { exact: true }).click();
+  await button(page, 'Morph', { exact: true }).click();
+  await button(page, 'Move it there').click();
+  await until(
+    async () => (await shownToasts(page)).some((text) => text.includes('The landmarks are others now')),
+    'the studio says that the landmarks are others',
+  );
   await done();
 });

@@ -1,8 +1,8 @@
 /** Edits landmarks with undo, and imports and exports them in the daemon's format. */
-import type { Landmark as WireLandmark, Place } from 'orbmorph';
+import type { Landmark as WireLandmark, Place, Supermesh } from 'orbmorph';
 import { work } from '../mesh/work';
 import type { Spot } from '../mesh/worker';
-import { patch, readyShapes, set, state, toast, wireLandmarks, type Landmark, type Shape } from '../state';
+import { patch, readyShapes, set, state, toast, wireLandmarks, type Landmark, type Result, type Shape } from '../state';
 
 let count = 0;
 
@@ -68,6 +68,27 @@ export function moveTo(id: number, shape: Shape, spot: Spot) {
     state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)),
     id,
   );
+}
+
+type Suspect = NonNullable<Supermesh['suspects']>[number];
+
+/**
+ * Moves a landmark of a morph to where it would lie by the surface around it, and shows it there; undo takes it back.
+ * Moves nothing if the landmark is no longer as the morph had it.
+ */
+export async function followSuggestion({ supermesh, request }: Result, { landmark, shape: number, at }: Suspect) {
+  const given = (supermesh.request ?? request)?.landmarks;
+  const shapes = readyShapes();
+  const shape = shapes[number];
+  const here = state.landmarks.filter((l) => shapes.every(({ key }) => l.at[key]));
+  const before = Array.isArray(given) ? given[landmark]?.at[number] : undefined;
+  const own = shape && here[landmark];
+  if (!own || JSON.stringify(own.at[shape.key].place) !== JSON.stringify(before))
+    return toast('The landmarks are others now. Morph again to see whether one may be misplaced.');
+  const [spot] = await work('locate', shape.key, [at], true);
+  if (!spot || byId(own.id) !== own) return;
+  moveTo(own.id, shape, spot);
+  set({ tab: 'landmarks' });
 }
 
 export function renameLandmark(id: number, name: string) {

@@ -1,5 +1,6 @@
 /** What the answer says about the map: how sure the match is, and where the map may be wrong. */
 import { set, state, type Result } from '../state';
+import { followSuggestion } from '../actions/landmarks';
 import { flipMatch, flippedOf, nextMatch } from '../actions/merge';
 import { isWord, sideOf } from '../mesh/others';
 import { player } from '../player';
@@ -83,19 +84,30 @@ export function Match({ result }: { result: Result }) {
   );
 }
 
-/** Landmarks that may be misplaced. */
-export function Suspects({ result: { supermesh } }: { result: Result }) {
-  const { shapes, suspects = [] } = supermesh;
+/** Landmarks that may be misplaced, and where they would lie. */
+export function Suspects({ result }: { result: Result }) {
+  const { shapes, suspects = [] } = result.supermesh;
   if (!suspects.length) return null;
   return (
     <ul class="hint" aria-label="Landmarks that may be misplaced">
-      {suspects.map(({ landmark, name, shape, share, distance_relative: far }) => (
-        <li key={`${shape} ${landmark}`}>
-          {`${name || `Landmark ${landmark + 1}`} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
-            shapes[shape].name
-          } it would lie ${Math.round(100 * far)} % of the diagonal away.`}
-        </li>
-      ))}
+      {suspects.map((suspect) => {
+        const { landmark, name, shape, share, distance_relative: far } = suspect;
+        const called = name || `Landmark ${landmark + 1}`;
+        return (
+          <li key={`${shape} ${landmark}`}>
+            {`${called} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
+              shapes[shape].name
+            } it would lie ${Math.round(100 * far)} % of the diagonal away. `}
+            <Button
+              kind="quiet"
+              title={`Moves ${called} to where the surface around it suggests. Undo takes it back.`}
+              onClick={() => void followSuggestion(result, suspect)}
+            >
+              Move it there
+            </Button>
+          </li>
+        );
+      })}
     </ul>
   );
 }
