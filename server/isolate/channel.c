@@ -13,7 +13,7 @@ typedef struct head {
 } head;
 
 static channel_result wait_for(int fd, short events, channel_continues continues, void *user) {
-  for (;;) {
+  while (!continues || continues(user)) {
     struct pollfd one = {.fd = fd, .events = events};
     int ready = poll(&one, 1, continues ? CHANNEL_LOOK_MS : -1);
     if (ready > 0) {
@@ -22,10 +22,8 @@ static channel_result wait_for(int fd, short events, channel_continues continues
     if (ready < 0 && errno != EINTR) {
       return CHANNEL_CLOSED;
     }
-    if (continues && !continues(user)) {
-      return CHANNEL_STOPPED;
-    }
   }
+  return CHANNEL_STOPPED;
 }
 
 /* Sends what the socket takes now; moves the parts on. *full: it took nothing. */
@@ -100,8 +98,12 @@ static void take_passed(struct msghdr *message, int *passed) {
   }
 }
 
+/* Asks before each part whether it continues: another end that sends without a pause never lets this one wait. */
 static channel_result receive_all(int fd, void *to, size_t size, int *passed, channel_continues continues, void *user) {
   for (size_t done = 0; done < size;) {
+    if (continues && !continues(user)) {
+      return CHANNEL_STOPPED;
+    }
     char control[CMSG_SPACE(4 * sizeof(int))];
     struct iovec part = {(char *)to + done, size - done};
     struct msghdr message = {

@@ -33,7 +33,8 @@ typedef struct frame {
   size_t size;
 } frame;
 
-/* Called while the other end lets this one wait, at least every CHANNEL_LOOK_MS: 0 gives up. NULL: never. */
+/* Called before each part that is received, and while the other end lets this one wait at least every CHANNEL_LOOK_MS:
+ * 0 gives up. NULL: never. */
 enum { CHANNEL_LOOK_MS = 20 };
 typedef int (*channel_continues)(void *user);
 

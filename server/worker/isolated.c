@@ -14,8 +14,8 @@
 
 enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 2 };
 
-/* Asset, places and spheres. */
-enum { OBJECTS_MOST = 3 };
+/* Alignment, asset, places and spheres. */
+enum { OBJECTS_MOST = 4 };
 
 typedef struct collected {
   resource_key keys[INPUTS_MOST];
@@ -203,13 +203,50 @@ static int take_done(const run_job *j, api_job_kind kind, const frame *f, const 
   return done.fine;
 }
 
-static void take_progress(const run_env *env, const frame *f) {
+/* What a process may report: each report costs the daemon's time, and each new stage a write to the catalogue.
+ * REPORTS_MOST: in a second. A process sends 50, as confined.c limits it, and its socket holds at most some 300 more,
+ * which arrive at once if the daemon is late. STAGES_MOST: of a job. A supermesh has 6; an embedding has 6, and more if
+ * several methods are tried. */
+enum { REPORTS_MOST = 5000, STAGES_MOST = 64 };
+
+typedef struct reports {
+  int64_t since_ms; /* orb_clock_ms() at which the present second began */
+  int count;        /* in this second */
+  int stages;
+  char stage[sizeof((progress_head *)0)->stage];
+} reports;
+
+/* Whether a text is the name of a stage, as core and the jobs write them. */
+static int is_stage(const char *text) {
+  const size_t letters = strspn(text, "abcdefghijklmnopqrstuvwxyz");
+  return letters > 0 && text[letters] == 0;
+}
+
+/* Shows a report of progress, but not once results arrive (holds): then stages no longer change. 1, or −1: no process
+ * reports that, or so much. */
+static int take_progress(const run_env *env, const frame *f, int holds, reports *so_far) {
+  const int64_t now = orb_clock_ms();
   progress_head head;
-  if (f->size == sizeof head) {
-    memcpy(&head, f->bytes, sizeof head);
-    head.stage[sizeof head.stage - 1] = 0;
+  if (now - so_far->since_ms >= 1000) {
+    so_far->since_ms = now;
+    so_far->count = 0;
+  }
+  if (++so_far->count > REPORTS_MOST || f->size != sizeof head) {
+    return -1;
+  }
+  memcpy(&head, f->bytes, sizeof head);
+  head.stage[sizeof head.stage - 1] = 0;
+  if (strcmp(head.stage, so_far->stage) != 0) {
+    memcpy(so_far->stage, head.stage, sizeof so_far->stage);
+    so_far->stages++;
+  }
+  if (so_far->stages > STAGES_MOST || !is_stage(head.stage)) {
+    return -1;
+  }
+  if (!holds) {
     progress_report(env->progress, head.stage, head.fraction >= 0 && head.fraction <= 1 ? head.fraction : 0);
   }
+  return 1;
 }
 
 /* Takes frames until the end: as take_done(), or −1 with the result of the channel. */
@@ -218,22 +255,21 @@ static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_
                      channel_result *why) {
   frame f;
   made_bytes bytes = {0};
+  reports so_far = {0};
   int count = 0;
   for (int taken = 1;;) {
     *why = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
     if (*why != CHANNEL_OK) {
       return -1;
     }
-    if (f.type == FRAME_PROGRESS && !out->holds) {
-      take_progress(env, &f);
+    if (f.type == FRAME_PROGRESS) {
+      taken = take_progress(env, &f, out->holds, &so_far);
     } else if (f.type == FRAME_OBJECT) {
-      taken = out->holds && ++count >= OBJECTS_MOST
-                  ? -1
-                  : take_object(env, ctx, kind, j, alignment, &f, bytes, out, problem);
+      taken = ++count > OBJECTS_MOST ? -1 : take_object(env, ctx, kind, j, alignment, &f, bytes, out, problem);
       p->last_ms = out->holds ? orb_clock_ms() + hold_ms : 0;
     } else if (f.type == FRAME_DONE) {
       taken = take_done(j, kind, &f, bytes, out, problem);
-    } else if (f.type != FRAME_PROGRESS || orb_clock_ms() >= p->last_ms) {
+    } else {
       taken = -1;
     }
     int over = f.type == FRAME_DONE;

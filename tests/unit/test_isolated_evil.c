@@ -9,6 +9,7 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -31,7 +32,10 @@ enum {
   LONG_REFUSAL = '1',
   MANY_VALUES = '2',
   LARGE_ALIGNMENT = '3',
-  GREEDY = '4'
+  GREEDY = '4',
+  FLOOD = '5',
+  STAGES = '6',
+  STRANGE_STAGE = '7'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -40,7 +44,16 @@ typedef struct stored {
   char data[64];
   run_env env;
   orb_context *ctx;
+  job_progress progress;
+  int shown; /* how often progress was shown */
 } stored;
+
+static void count_shown(void *user, const char *stage, double fraction) {
+  stored *s = user;
+  (void)stage;
+  (void)fraction;
+  s->shown++;
+}
 
 static int setup(void **state) {
   stored *s = calloc(1, sizeof *s);
@@ -51,6 +64,8 @@ static int setup(void **state) {
     return -1;
   }
   s->env.tenant = "";
+  s->progress = (job_progress){.show = count_shown, .user = s};
+  s->env.progress = &s->progress;
   *state = s;
   return 0;
 }
@@ -82,9 +97,10 @@ static void send_object(int channel, const task_head *task) {
   close(fd);
 }
 
-static void send_progress(int channel) {
-  progress_head head = {.stage = "store"};
+static void send_progress(int channel, const char *stage) {
+  progress_head head = {0};
   const struct iovec part = {&head, sizeof head};
+  snprintf(head.stage, sizeof head.stage, "%s", stage);
   if (channel_send(channel, FRAME_PROGRESS, &part, 1, -1, NULL, NULL) != CHANNEL_OK) {
     _exit(9);
   }
@@ -141,6 +157,29 @@ _Noreturn static void claim_no_bytes(int channel, const task_head *task) {
   task_end(channel, &done, "{}", NULL);
 }
 
+/* Reports progress for ever. */
+_Noreturn static void report(int channel, const char *const stages[2], int pause_us) {
+  for (int i = 0;; i++) {
+    send_progress(channel, stages[i % 2]);
+    if (pause_us > 0) {
+      usleep((useconds_t)pause_us);
+    }
+  }
+}
+
+static void report_in_ways(int channel, char what) {
+  switch (what) {
+    case FLOOD:
+      report(channel, (const char *const[]){"embed", "embed"}, 0);
+    case STAGES:
+      report(channel, (const char *const[]){"read", "embed"}, 5000);
+    case STRANGE_STAGE:
+      report(channel, (const char *const[]){"embed", "\",\xff"}, 5000);
+    default:
+      break;
+  }
+}
+
 static void evil(int channel) {
   frame f;
   task_head task;
@@ -174,12 +213,13 @@ static void evil(int channel) {
     default:
       break;
   }
+  report_in_ways(channel, task.key[0]);
   for (int sent = 0;; sent++) {
     if (task.key[0] == OBJECTS || sent == 0) {
       send_object(channel, &task);
     }
     if (task.key[0] == PROGRESS) {
-      send_progress(channel);
+      send_progress(channel, "store");
     }
     usleep(task.key[0] == NOTHING ? 1000000 : 1000);
   }
@@ -257,6 +297,48 @@ static void test_an_object_and_then_no_end(void **state) {
   }
 }
 
+/* The process reports progress for ever: without a pause, or in stages that no job has so many of, or one that no job
+ * has. The context has no deadline: only the limits on reports end it. */
+static void test_reports_without_end(void **state) {
+  static const char ways[] = {FLOOD, STAGES, STRANGE_STAGE};
+  static const int most[] = {5000, 64, 1}; /* reports that are shown */
+  for (size_t i = 0; i < sizeof ways; i++) {
+    stored *s = *state;
+    api_problem problem = {0};
+    isolated_end end;
+    s->shown = 0;
+    assert_false(run(s, ways[i], &problem, &end));
+    assert_true(end.died);
+    assert_in_range(s->shown, 1, most[i]);
+  }
+}
+
+static int continues_for(void *user) {
+  int *left = user;
+  return --*left > 0;
+}
+
+/* All that is received has arrived before, so the daemon never waits for the process. It is asked for each part even
+ * so. */
+static void test_a_stop_while_bytes_arrive(void **state) {
+  enum { FRAMES = 20 };
+  int ends[2], left = FRAMES, taken = 0;
+  frame f;
+  (void)state;
+  assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends), 0);
+  for (int i = 0; i < FRAMES; i++) {
+    send_progress(ends[1], "embed");
+  }
+  channel_result got;
+  while ((got = channel_receive(ends[0], CHANNEL_ANSWER_MOST, &f, continues_for, &left)) == CHANNEL_OK) {
+    frame_free(&f);
+    assert_true(++taken < FRAMES);
+  }
+  assert_int_equal(got, CHANNEL_STOPPED);
+  close(ends[0]);
+  close(ends[1]);
+}
+
 static long peak_kilobytes(void) {
   struct rusage used;
   assert_int_equal(getrusage(RUSAGE_SELF, &used), 0);
@@ -311,6 +393,8 @@ int main(int count, char **arguments) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_an_object_and_then_a_damaged_input, setup, teardown),
       cmocka_unit_test_setup_teardown(test_an_object_and_then_no_end, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_reports_without_end, setup, teardown),
+      cmocka_unit_test(test_a_stop_while_bytes_arrive),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_takes_all_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
