@@ -27,20 +27,20 @@ enum {
 };
 
 /* All that a reader and a job need: memory, threads, the clock, the channel, and memory as files. Any other call fails
- * with EPERM, so that what libraries merely try, such as reading /sys, does not end the process. */
+ * with EPERM, so that what libraries merely try, such as reading /sys, does not end the process. Not fcntl() and
+ * ioctl(): with them a process chooses a signal, and who of the same user gets it once a descriptor is ready. */
 static const int allowed[] = {
-    SCMP_SYS(read),          SCMP_SYS(write),           SCMP_SYS(readv),          SCMP_SYS(writev),
-    SCMP_SYS(pread64),       SCMP_SYS(pwrite64),        SCMP_SYS(lseek),          SCMP_SYS(close),
-    SCMP_SYS(dup),           SCMP_SYS(fcntl),           SCMP_SYS(fstat),          SCMP_SYS(newfstatat),
-    SCMP_SYS(ftruncate),     SCMP_SYS(memfd_create),    SCMP_SYS(sendmsg),        SCMP_SYS(recvmsg),
-    SCMP_SYS(poll),          SCMP_SYS(ppoll),           SCMP_SYS(mmap),           SCMP_SYS(munmap),
-    SCMP_SYS(mremap),        SCMP_SYS(mprotect),        SCMP_SYS(madvise),        SCMP_SYS(brk),
-    SCMP_SYS(futex),         SCMP_SYS(set_robust_list), SCMP_SYS(rseq),           SCMP_SYS(set_tid_address),
-    SCMP_SYS(gettid),        SCMP_SYS(getpid),          SCMP_SYS(sched_yield),    SCMP_SYS(sched_getaffinity),
-    SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),      SCMP_SYS(gettimeofday),
-    SCMP_SYS(getrandom),     SCMP_SYS(rt_sigaction),    SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn),
-    SCMP_SYS(sigaltstack),   SCMP_SYS(restart_syscall), SCMP_SYS(getrusage),      SCMP_SYS(exit),
-    SCMP_SYS(exit_group)};
+    SCMP_SYS(newfstatat),        SCMP_SYS(read),         SCMP_SYS(readv),     SCMP_SYS(write),
+    SCMP_SYS(clock_gettime),     SCMP_SYS(pread64),      SCMP_SYS(writev),    SCMP_SYS(pwrite64),
+    SCMP_SYS(ftruncate),         SCMP_SYS(fstat),        SCMP_SYS(dup),       SCMP_SYS(lseek),
+    SCMP_SYS(memfd_create),      SCMP_SYS(sendmsg),      SCMP_SYS(close),     SCMP_SYS(recvmsg),
+    SCMP_SYS(set_tid_address),   SCMP_SYS(mmap),         SCMP_SYS(poll),      SCMP_SYS(munmap),
+    SCMP_SYS(set_robust_list),   SCMP_SYS(mprotect),     SCMP_SYS(mremap),    SCMP_SYS(futex),
+    SCMP_SYS(sched_getaffinity), SCMP_SYS(rseq),         SCMP_SYS(brk),       SCMP_SYS(madvise),
+    SCMP_SYS(sched_yield),       SCMP_SYS(ppoll),        SCMP_SYS(gettid),    SCMP_SYS(getpid),
+    SCMP_SYS(clock_nanosleep),   SCMP_SYS(gettimeofday), SCMP_SYS(nanosleep), SCMP_SYS(rt_sigaction),
+    SCMP_SYS(rt_sigprocmask),    SCMP_SYS(rt_sigreturn), SCMP_SYS(getrandom), SCMP_SYS(sigaltstack),
+    SCMP_SYS(restart_syscall),   SCMP_SYS(getrusage),    SCMP_SYS(exit),      SCMP_SYS(exit_group)};
 
 static struct sock_fprog filter;
 

@@ -1,13 +1,17 @@
 /* What a job's process can do to the daemon if a mesh has taken it over. This program is its own zygote, whose
  * processes do what the request says. */
+#include <fcntl.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -35,7 +39,8 @@ enum {
   GREEDY = '4',
   FLOOD = '5',
   STAGES = '6',
-  STRANGE_STAGE = '7'
+  STRANGE_STAGE = '7',
+  SIGNALS = '8'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -150,6 +155,19 @@ _Noreturn static void take_all(int channel, const task_head *task) {
   _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
 }
 
+/* Tries to choose who gets the signals of a descriptor, and which, and says what worked. */
+_Noreturn static void send_signals(int channel, const task_head *task) {
+  done_head done = {.problem = "corrupt"};
+  struct f_owner_ex owner = {.type = F_OWNER_PID, .pid = getppid()};
+  int number = getppid();
+  task_confine(task);
+  snprintf(done.detail, sizeof done.detail, "%d %d %d %d %d %d", fcntl(channel, F_SETOWN, number),
+           fcntl(channel, F_SETOWN_EX, &owner), fcntl(channel, F_SETSIG, SIGUSR1), fcntl(channel, F_SETFL, O_ASYNC),
+           ioctl(channel, FIOSETOWN, &number), prctl(PR_SET_PDEATHSIG, SIGUSR1));
+  const struct iovec part = {&done, sizeof done};
+  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
+}
+
 /* A result that says that it has no bytes, so that no quota counts it. */
 _Noreturn static void claim_no_bytes(int channel, const task_head *task) {
   done_head done = {.fine = 1};
@@ -210,6 +228,8 @@ static void evil(int channel) {
       send_large_alignment(channel, request);
     case GREEDY:
       take_all(channel, &task);
+    case SIGNALS:
+      send_signals(channel, &task);
     default:
       break;
   }
@@ -385,6 +405,19 @@ static void test_a_process_that_takes_all_memory(void **state) {
   api_problem_free(&problem);
 }
 
+/* Signals that the kernel sends for a descriptor reach any process of the same user. */
+static void test_a_process_that_sends_signals(void **state) {
+  api_problem problem = {0};
+  isolated_end end;
+  if (SANDBOX_SANITIZED) {
+    skip(); /* no filter of system calls */
+  }
+  assert_false(run(*state, SIGNALS, &problem, &end));
+  assert_string_equal(problem.name, "corrupt");
+  assert_string_equal(problem.detail, "-1 -1 -1 -1 -1 -1");
+  api_problem_free(&problem);
+}
+
 int main(int count, char **arguments) {
   if (count > 1 && strcmp(arguments[1], ISOLATE_FLAG) == 0) {
     isolate_zygote(evil);
@@ -397,6 +430,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test(test_a_stop_while_bytes_arrive),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_takes_all_memory, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_process_that_sends_signals, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
