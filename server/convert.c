@@ -45,8 +45,10 @@ static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out,
   int64_t bytes = 0;
   channel_result got = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
   if (got == CHANNEL_OK && f.type == FRAME_OBJECT) {
-    const int fits = f.fd >= 0;
-    store_result stored = fits ? objects_copy(store, ctx, f.fd, out, &bytes) : STORE_OK;
+    object_head head = {.size = 0};
+    const int fits = task_read_object(&f, &head);
+    store_result stored = fits ? objects_copy(store, ctx, f.fd, head.start, head.size, out) : STORE_OK;
+    bytes = head.size;
     frame_free(&f);
     if (!fits || stored != STORE_OK) {
       return fits && orb_context_check(ctx) == ORB_OK ? task_refuse_store(stored, problem) : -1;

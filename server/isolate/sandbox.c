@@ -26,21 +26,20 @@ enum {
   DESCRIPTORS = 128
 };
 
-/* All that a reader and a job need: memory, threads, the clock, the channel, and memory as files. Any other call fails
- * with EPERM, so that what libraries merely try, such as reading /sys, does not end the process. Not fcntl() and
+/* All that a reader and a job need: memory, threads, the clock, the channel, and files that are open. Any other call
+ * fails with EPERM, so that what libraries merely try, such as reading /sys, does not end the process. Not fcntl() and
  * ioctl(): with them a process chooses a signal, and who of the same user gets it once a descriptor is ready. */
 static const int allowed[] = {
-    SCMP_SYS(newfstatat),        SCMP_SYS(read),         SCMP_SYS(readv),     SCMP_SYS(write),
-    SCMP_SYS(clock_gettime),     SCMP_SYS(pread64),      SCMP_SYS(writev),    SCMP_SYS(pwrite64),
-    SCMP_SYS(ftruncate),         SCMP_SYS(fstat),        SCMP_SYS(dup),       SCMP_SYS(lseek),
-    SCMP_SYS(memfd_create),      SCMP_SYS(sendmsg),      SCMP_SYS(close),     SCMP_SYS(recvmsg),
-    SCMP_SYS(set_tid_address),   SCMP_SYS(mmap),         SCMP_SYS(poll),      SCMP_SYS(munmap),
-    SCMP_SYS(set_robust_list),   SCMP_SYS(mprotect),     SCMP_SYS(mremap),    SCMP_SYS(futex),
-    SCMP_SYS(sched_getaffinity), SCMP_SYS(rseq),         SCMP_SYS(brk),       SCMP_SYS(madvise),
-    SCMP_SYS(sched_yield),       SCMP_SYS(ppoll),        SCMP_SYS(gettid),    SCMP_SYS(getpid),
-    SCMP_SYS(clock_nanosleep),   SCMP_SYS(gettimeofday), SCMP_SYS(nanosleep), SCMP_SYS(rt_sigaction),
-    SCMP_SYS(rt_sigprocmask),    SCMP_SYS(rt_sigreturn), SCMP_SYS(getrandom), SCMP_SYS(sigaltstack),
-    SCMP_SYS(restart_syscall),   SCMP_SYS(getrusage),    SCMP_SYS(exit),      SCMP_SYS(exit_group)};
+    SCMP_SYS(newfstatat),   SCMP_SYS(clock_gettime),     SCMP_SYS(read),      SCMP_SYS(write),
+    SCMP_SYS(readv),        SCMP_SYS(nanosleep),         SCMP_SYS(writev),    SCMP_SYS(pwrite64),
+    SCMP_SYS(pread64),      SCMP_SYS(sched_yield),       SCMP_SYS(lseek),     SCMP_SYS(fstat),
+    SCMP_SYS(sendmsg),      SCMP_SYS(set_tid_address),   SCMP_SYS(close),     SCMP_SYS(poll),
+    SCMP_SYS(recvmsg),      SCMP_SYS(set_robust_list),   SCMP_SYS(munmap),    SCMP_SYS(dup),
+    SCMP_SYS(mremap),       SCMP_SYS(sched_getaffinity), SCMP_SYS(brk),       SCMP_SYS(futex),
+    SCMP_SYS(gettimeofday), SCMP_SYS(clock_nanosleep),   SCMP_SYS(ppoll),     SCMP_SYS(rseq),
+    SCMP_SYS(getpid),       SCMP_SYS(rt_sigprocmask),    SCMP_SYS(gettid),    SCMP_SYS(madvise),
+    SCMP_SYS(rt_sigaction), SCMP_SYS(restart_syscall),   SCMP_SYS(getrandom), SCMP_SYS(sigaltstack),
+    SCMP_SYS(rt_sigreturn), SCMP_SYS(getrusage),         SCMP_SYS(exit),      SCMP_SYS(exit_group)};
 
 static struct sock_fprog filter;
 
@@ -70,6 +69,13 @@ int sandbox_prepare(void) {
   for (size_t i = 0; fine && i < sizeof allowed / sizeof *allowed; i++) {
     fine = seccomp_rule_add(rules, SCMP_ACT_ALLOW, allowed[i], 0) == 0;
   }
+  /* Only memory that RLIMIT_DATA counts: it does not count what is shared, grows like a stack, or was written to and
+   * can be read only. For the same reason no file in memory can be created: RLIMIT_FSIZE limits each by itself. */
+  fine =
+      fine &&
+      seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mmap), 1,
+                       SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_TYPE | MAP_GROWSDOWN, MAP_PRIVATE)) == 0 &&
+      seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mprotect), 1, SCMP_A2(SCMP_CMP_EQ, PROT_READ | PROT_WRITE)) == 0;
   /* Threads, but no processes. The flags of clone3() lie in memory, which a filter cannot read: ENOSYS makes the C
    * library use clone(). */
   fine = fine &&
@@ -114,7 +120,7 @@ int sandbox_enter(const sandbox_limits *limits) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_NOFILE, DESCRIPTORS);
   limit(RLIMIT_CPU, (uint64_t)limits->cpu_seconds);
-  limit(RLIMIT_FSIZE, (uint64_t)limits->memory); /* also of memory as a file */
+  limit(RLIMIT_FSIZE, (uint64_t)limits->memory); /* also of a file in memory */
   if (!SANDBOX_SANITIZED) {
     (void)mallopt(M_ARENA_MAX, ARENAS);
     limit(RLIMIT_AS,

@@ -3,17 +3,28 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include "api/json.h"
 #include "isolate/sandbox.h"
 
-void task_confine(const task_head *task) {
+int task_confine(const task_head *task) {
+  const int results = task->kind == TASK_CHECK ? -1 : memfd_create("results", MFD_CLOEXEC);
   sandbox_limits limits = {.memory = task->limit + task->inputs,
                            .cpu_seconds = task->cpu_seconds,
                            .threads = task->threads,
                            .nice = task->nice};
   sandbox_enter(&limits);
+  return results;
+}
+
+channel_result task_send_object(int channel, int results, object_kind kind, const char *id, int64_t start,
+                                int64_t size) {
+  object_head head = {.kind = kind, .start = start, .size = size};
+  strncpy(head.id, id, sizeof head.id - 1);
+  const struct iovec part = {&head, sizeof head};
+  return channel_send(channel, FRAME_OBJECT, &part, 1, results, NULL, NULL);
 }
 
 channel_result task_answer(int channel, done_head *done, const char *json, const api_problem *problem) {
@@ -48,6 +59,14 @@ static int are_members(const char *text) {
   cJSON_Delete(read);
   api_text_free(&whole);
   return fine;
+}
+
+int task_read_object(const frame *f, object_head *head) {
+  if (f->size != sizeof *head || f->fd < 0) {
+    return 0;
+  }
+  memcpy(head, f->bytes, sizeof *head);
+  return head->start >= 0 && head->size >= 0;
 }
 
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem) {

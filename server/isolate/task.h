@@ -45,9 +45,10 @@ typedef struct progress_head {
   double fraction;
 } progress_head;
 
-/* FRAME_OBJECT, with the descriptor. */
+/* FRAME_OBJECT, with the descriptor of the file that has the object. */
 typedef struct object_head {
   object_kind kind;
+  int64_t start, size; /* in bytes */
   char id[API_ID_SIZE];
 } object_head;
 
@@ -59,14 +60,20 @@ typedef struct done_head {
   char problem[40], detail[512];
 } done_head;
 
-/* The process's side. Confines the calling process to the limits of the task. */
-void task_confine(const task_head *task);
+/* The process's side. Confines the calling process to the limits of the task. Returns the only file in memory that it
+ * can write to, for its results; −1: none, as for a check. A single file, since the kernel limits each by itself. */
+int task_confine(const task_head *task);
+/* Sends FRAME_OBJECT, with a descriptor of that file. */
+channel_result task_send_object(int channel, int results, object_kind kind, const char *id, int64_t start,
+                                int64_t size);
 /* Sends FRAME_DONE. json, problem: may be NULL. */
 channel_result task_answer(int channel, done_head *done, const char *json, const api_problem *problem);
 /* The same, then ends the process. */
 _Noreturn void task_end(int channel, done_head *done, const char *json, const api_problem *problem);
 
-/* The daemon's side. Reads FRAME_DONE: json is allocated with malloc(), or NULL. The caller checks it with task_json().
+/* The daemon's side. Reads FRAME_OBJECT; 0: it is none. */
+int task_read_object(const frame *f, object_head *head);
+/* Reads FRAME_DONE: json is allocated with malloc(), or NULL. The caller checks it with task_json().
  * 0: the result contradicts itself. */
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem);
 /* Reads JSON that a process wrote; the caller frees it with cJSON_Delete(). NULL: it is none, or has more values than

@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/sendfile.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
@@ -184,8 +183,9 @@ void objects_hold_again(objects *store) {
 store_result objects_begin(objects *store, object_temp *temp) {
   char path[PATH_MAX];
   if (store->remote.publish) {
-    *temp = (object_temp){.fd = memfd_create("object", MFD_CLOEXEC), .store = store};
-    return temp->fd >= 0 ? STORE_OK : file_failed("create", "an object in memory");
+    *temp = (object_temp){.fd = dup(store->remote.file), .store = store};
+    temp->start = temp->fd >= 0 ? lseek(temp->fd, 0, SEEK_END) : -1;
+    return temp->start >= 0 ? STORE_OK : file_failed("create", "an object in memory");
   }
   snprintf(path, sizeof path, "%s/tmp/put-XXXXXX", store->root);
   temp->fd = mkostemp(path, O_CLOEXEC);
@@ -233,7 +233,8 @@ void objects_abandon(object_temp *temp) {
 store_result objects_publish(objects *store, object_temp *temp, object_kind kind, const char *id) {
   char from[PATH_MAX], name[OBJECT_NAME];
   if (store->remote.publish) {
-    store_result status = store->remote.publish(store->remote.user, kind, id, temp->fd);
+    const int64_t size = lseek(temp->fd, 0, SEEK_CUR) - temp->start;
+    store_result status = store->remote.publish(store->remote.user, kind, id, temp->start, size);
     objects_abandon(temp);
     return status;
   }
@@ -259,19 +260,15 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
   return status;
 }
 
-store_result objects_copy(objects *store, orb_context *ctx, int from, object_temp *temp, int64_t *bytes) {
+store_result objects_copy(objects *store, orb_context *ctx, int from, int64_t start, int64_t size, object_temp *temp) {
   enum { COPY_BYTES = 16 << 20 };
-  struct stat info;
-  if (fstat(from, &info) != 0) {
-    return STORE_ERROR;
-  }
   store_result stored = objects_begin(store, temp);
-  off_t at = 0;
-  while (stored == STORE_OK && at < info.st_size) {
-    off_t left = info.st_size - at;
+  off_t at = start;
+  while (stored == STORE_OK && at - start < size) {
+    off_t left = size - (at - start);
     ssize_t n = sendfile(temp->fd, from, &at, (size_t)(left < COPY_BYTES ? left : COPY_BYTES));
     if (n == 0) {
-      stored = STORE_ERROR; /* the process has cut it short */
+      stored = STORE_ERROR; /* the process has written less */
     } else if (n < 0 && errno != EINTR) {
       stored = errno == ENOSPC || errno == EDQUOT || errno == EFBIG ? STORE_FULL : STORE_ERROR;
     } else if (orb_context_check(ctx) != ORB_OK) {
@@ -279,7 +276,6 @@ store_result objects_copy(objects *store, orb_context *ctx, int from, object_tem
     }
     FAULT_POINT("temp-written");
   }
-  *bytes = (int64_t)at;
   return stored;
 }
 

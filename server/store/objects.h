@@ -36,11 +36,13 @@ store_result objects_open_remote(const objects_remote *remote, objects **out);
 void objects_close(objects *store);
 
 typedef struct object_temp {
-  int fd; /* −1: none */
+  int fd;        /* −1: none */
+  int64_t start; /* in the file of a process without others */
   char name[16];
   const objects *store;
 } object_temp;
 
+/* A process without other files has one at a time. */
 store_result objects_begin(objects *store, object_temp *temp);
 /* Appends all bytes. */
 store_result objects_append(object_temp *temp, const void *bytes, size_t size);
@@ -65,9 +67,9 @@ void objects_let_go(objects *store);
 struct object_lock;
 void objects_share(objects *store, struct object_lock *lock);
 
-/* Begins, and appends all bytes that the file of a descriptor has now, in parts: a process that made it could still
- * write to it. *bytes: how many. Ends when the context is cancelled or reaches its deadline. */
-store_result objects_copy(objects *store, orb_context *ctx, int from, object_temp *temp, int64_t *bytes);
+/* Begins, and appends so many bytes of a file from `start` on, in parts: a process that made the file could still write
+ * to it. STORE_ERROR if it has fewer. Ends when the context is cancelled or reaches its deadline. */
+store_result objects_copy(objects *store, orb_context *ctx, int from, int64_t start, int64_t size, object_temp *temp);
 
 /* Opens an object for reading; the caller closes *fd. */
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size);

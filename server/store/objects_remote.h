@@ -1,5 +1,5 @@
-/* The store of a process that has no files: temporary files lie in memory, and these functions take what is published
- * and give what is read. */
+/* The store of a process that has no files but one in memory: objects are written into it one after another, and these
+ * functions take what is published and give what is read. */
 #ifndef ORB_STORE_OBJECTS_REMOTE_H
 #define ORB_STORE_OBJECTS_REMOTE_H
 
@@ -9,10 +9,11 @@
 #include "store/result.h"
 
 typedef struct objects_remote {
-  /* The caller keeps the descriptor. */
-  store_result (*publish)(void *user, object_kind kind, const char *id, int fd);
+  /* The object is so many bytes of the file from `start` on. */
+  store_result (*publish)(void *user, object_kind kind, const char *id, int64_t start, int64_t size);
   store_result (*read)(void *user, object_kind kind, const char *id, int *fd, uint64_t *size);
   void *user;
+  int file;   /* −1: nothing can be written */
   int bucket; /* whether what is published goes to a bucket */
 } objects_remote;
 

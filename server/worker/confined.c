@@ -20,7 +20,7 @@ typedef struct input {
 } input;
 
 typedef struct confined {
-  int channel, count;
+  int channel, results, count;
   task_head task;
   char *request;
   input inputs[INPUTS_MOST];
@@ -56,12 +56,9 @@ static store_result read_object(void *user, object_kind kind, const char *id, in
   return STORE_NOT_FOUND;
 }
 
-static store_result publish(void *user, object_kind kind, const char *id, int fd) {
+static store_result publish(void *user, object_kind kind, const char *id, int64_t start, int64_t size) {
   const confined *c = user;
-  object_head head = {.kind = kind};
-  strncpy(head.id, id, sizeof head.id - 1);
-  const struct iovec part = {&head, sizeof head};
-  return channel_send(c->channel, FRAME_OBJECT, &part, 1, fd, NULL, NULL) == CHANNEL_OK ? STORE_OK : STORE_ERROR;
+  return task_send_object(c->channel, c->results, kind, id, start, size) == CHANNEL_OK ? STORE_OK : STORE_ERROR;
 }
 
 static void show(void *user, const char *stage, double fraction) {
@@ -92,7 +89,7 @@ static orb_context *make_context(confined *c, job_progress *progress) {
 }
 
 static _Noreturn void run_job_task(confined *c) {
-  const objects_remote remote = {publish, read_object, c, c->task.bucket};
+  const objects_remote remote = {publish, read_object, c, c->results, c->task.bucket};
   job_progress progress = {.show = show, .user = c};
   run_env env = {.progress = &progress, .get = get, .user = c};
   const run_job task = {c->task.key, c->request, c->task.embed_ms};
@@ -139,7 +136,7 @@ static void check_one(confined *c, const frame *f) {
 }
 
 _Noreturn static void run_conversion(confined *c, const frame *f) {
-  const objects_remote remote = {publish, read_object, c, c->task.bucket};
+  const objects_remote remote = {publish, read_object, c, c->results, c->task.bucket};
   objects *store;
   api_problem problem = {0};
   done_head done = {0};
@@ -202,7 +199,7 @@ void confined_work(int channel) {
   confined c = {.channel = channel};
   frame f;
   take_task(&c, &f);
-  task_confine(&c.task);
+  c.results = task_confine(&c.task);
   if (c.task.kind == TASK_CHECK) {
     run_checks(&c, &f);
   }

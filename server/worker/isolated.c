@@ -126,10 +126,9 @@ static int may_make(api_job_kind kind, object_kind object) {
 }
 
 /* Keeps an alignment, whose row has the hash of its bytes. */
-static void take_alignment(const run_env *env, orb_context *ctx, const char *id, int fd) {
+static void take_alignment(const run_env *env, orb_context *ctx, const char *id, const object_head *head, int fd) {
   object_temp temp = {.fd = -1};
-  int64_t bytes;
-  if (objects_copy(env->store, ctx, fd, &temp, &bytes) != STORE_OK ||
+  if (objects_copy(env->store, ctx, fd, head->start, head->size, &temp) != STORE_OK ||
       alignments_publish(env->cat, env->store, id, env->tenant, &temp) != STORE_OK) {
     log_warn("the alignment %s could not be kept", id);
   }
@@ -142,15 +141,14 @@ typedef int64_t made_bytes[OBJECT_KINDS]; /* of each object that the process has
 static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j, const char *alignment,
                        const frame *f, made_bytes bytes, run_output *out, api_problem *problem) {
   object_head head;
-  if (f->size != sizeof head || f->fd < 0) {
+  if (!task_read_object(f, &head)) {
     return -1;
   }
-  memcpy(&head, f->bytes, sizeof head);
   if (head.kind == OBJECT_ALIGNMENT && kind == API_JOB_SUPERMESH) {
     if (!alignment[0] || memcmp(head.id, alignment, sizeof head.id) != 0 || out->holds) {
       return -1;
     }
-    take_alignment(env, ctx, alignment, f->fd);
+    take_alignment(env, ctx, alignment, &head, f->fd);
     return 1;
   }
   if (!may_make(kind, head.kind) || memcmp(head.id, j->key, sizeof head.id) != 0) {
@@ -161,7 +159,8 @@ static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, 
     out->holds = 1;
   }
   object_temp temp = {.fd = -1};
-  store_result stored = objects_copy(env->store, ctx, f->fd, &temp, &bytes[head.kind]);
+  store_result stored = objects_copy(env->store, ctx, f->fd, head.start, head.size, &temp);
+  bytes[head.kind] = head.size;
   stored = stored == STORE_OK ? objects_publish(env->store, &temp, head.kind, head.id) : stored;
   objects_abandon(&temp);
   if (stored != STORE_OK && orb_context_check(ctx) == ORB_OK) {

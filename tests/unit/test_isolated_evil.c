@@ -40,7 +40,8 @@ enum {
   FLOOD = '5',
   STAGES = '6',
   STRANGE_STAGE = '7',
-  SIGNALS = '8'
+  SIGNALS = '8',
+  FILES = '9'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -91,7 +92,7 @@ static int teardown(void **state) {
 /* ---- the process ---- */
 
 static void send_object(int channel, const task_head *task) {
-  object_head head = {.kind = OBJECT_SPHERE};
+  object_head head = {.kind = OBJECT_SPHERE, .size = 6};
   int fd = memfd_create("object", MFD_CLOEXEC);
   const struct iovec part = {&head, sizeof head};
   memcpy(head.id, task->key, sizeof head.id);
@@ -127,7 +128,7 @@ _Noreturn static void refuse_at_length(int channel, size_t bytes) {
 }
 
 _Noreturn static void send_large_alignment(int channel, const char *text) {
-  object_head head = {.kind = OBJECT_ALIGNMENT};
+  object_head head = {.kind = OBJECT_ALIGNMENT, .size = ALIGNMENT_BYTES};
   const struct iovec part = {&head, sizeof head};
   api_json_error error;
   api_problem ignored = {0};
@@ -151,6 +152,62 @@ _Noreturn static void take_all(int channel, const task_head *task) {
     memset(at, 1, 1 << 20);
   }
   snprintf(done.detail, sizeof done.detail, "%d", megabytes);
+  const struct iovec part = {&done, sizeof done};
+  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
+}
+
+/* Writes megabytes until the kernel refuses. */
+static int fill_file(int fd) {
+  static char block[1 << 20];
+  int megabytes = 0;
+  for (ssize_t n; megabytes < 256 && (n = write(fd, block, sizeof block)) == sizeof block;) {
+    megabytes++;
+  }
+  return megabytes;
+}
+
+/* Takes mappings that RLIMIT_DATA does not count. */
+static int fill_mapping(int flags) {
+  enum { BYTES = 16 << 20 };
+  int megabytes = 0;
+  for (char *at; (at = mmap(NULL, BYTES, PROT_READ | PROT_WRITE, flags | MAP_ANONYMOUS, -1, 0)) != MAP_FAILED;) {
+    memset(at, 1, BYTES);
+    megabytes += BYTES >> 20;
+  }
+  return megabytes;
+}
+
+/* Keeps memory that it no longer can write to. */
+static int fill_read_only(void) {
+  enum { BYTES = 1 << 20, TIMES = 1024 };
+  int megabytes = 0;
+  for (char *at; megabytes < TIMES &&
+                 (at = mmap(NULL, BYTES, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)) != MAP_FAILED;) {
+    memset(at, 1, BYTES);
+    if (mprotect(at, BYTES, PROT_READ) != 0) {
+      break;
+    }
+    megabytes++;
+  }
+  return megabytes;
+}
+
+/* Keeps memory in files, and in mappings that are no data of the process, and says how many megabytes. */
+_Noreturn static void keep_files(int channel, const task_head *task) {
+  enum { FILES_MOST = 20 };
+  done_head done = {.problem = "corrupt"};
+  signal(SIGXFSZ, SIG_IGN);
+  const int results = task_confine(task);
+  int made = 0, megabytes = results >= 0 ? fill_file(results) : 0;
+  for (int i = 0; i < FILES_MOST; i++) {
+    const int fd = memfd_create("more", 0);
+    if (fd >= 0) {
+      made++;
+      megabytes += fill_file(fd);
+    }
+  }
+  const int mapped = fill_read_only() + fill_mapping(MAP_SHARED) + fill_mapping(MAP_PRIVATE | MAP_GROWSDOWN);
+  snprintf(done.detail, sizeof done.detail, "%d %d %d", megabytes, made, mapped);
   const struct iovec part = {&done, sizeof done};
   _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
 }
@@ -230,6 +287,8 @@ static void evil(int channel) {
       take_all(channel, &task);
     case SIGNALS:
       send_signals(channel, &task);
+    case FILES:
+      keep_files(channel, &task);
     default:
       break;
   }
@@ -405,6 +464,24 @@ static void test_a_process_that_takes_all_memory(void **state) {
   api_problem_free(&problem);
 }
 
+/* A process has one file in memory, with as many bytes as its budget and its inputs (64 MB and none here). */
+static void test_a_process_that_keeps_files(void **state) {
+  api_problem problem = {0};
+  isolated_end end;
+  int megabytes, files, mapped;
+  if (SANDBOX_SANITIZED) {
+    skip(); /* no filter of system calls */
+  }
+  assert_false(run(*state, FILES, &problem, &end));
+  assert_string_equal(problem.name, "corrupt");
+  print_message("%s\n", problem.detail);
+  assert_int_equal(sscanf(problem.detail, "%d %d %d", &megabytes, &files, &mapped), 3);
+  assert_int_equal(megabytes, 64);
+  assert_int_equal(files, 0);
+  assert_int_equal(mapped, 0);
+  api_problem_free(&problem);
+}
+
 /* Signals that the kernel sends for a descriptor reach any process of the same user. */
 static void test_a_process_that_sends_signals(void **state) {
   api_problem problem = {0};
@@ -431,6 +508,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_takes_all_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_sends_signals, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_process_that_keeps_files, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
