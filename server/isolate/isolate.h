@@ -30,6 +30,7 @@ int isolate_is_on(void);
 /* One process. */
 typedef struct isolated {
   int channel, status, pidfd; /* −1: none */
+  int said;                   /* a pipe that is its standard error; −1: none */
   orb_context *ctx;           /* of the job: its cancel flag and deadline end the process */
   int (*wanted)(void *user);  /* 0: cancel the context; NULL: never */
   void *user;
@@ -40,7 +41,8 @@ typedef struct isolated {
 int isolate_open(isolated *p, orb_context *ctx);
 channel_result isolate_send(isolated *p, frame_type type, const struct iovec *parts, int count, int passed);
 channel_result isolate_receive(isolated *p, size_t most, frame *out);
-/* Kills the process unless it has ended. Returns its status as of waitpid(); −1: unknown. */
+/* Kills the process unless it has ended, and logs what it wrote to standard error. Returns its status as of waitpid();
+ * −1: unknown. */
 int isolate_close(isolated *p);
 /* Describes a status that is not 0: "was killed by signal 11 (Segmentation fault)". */
 void isolate_status_text(int status, char *out, size_t room);

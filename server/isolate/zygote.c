@@ -19,11 +19,15 @@
 #include "isolate/sandbox.h"
 #include "log.h"
 
-enum { PASSED_MOST = 2, HELLO_MS = 60000, PROCESSES = 1024, STATUS_MS = 2000 };
+enum { PASSED_MOST = 3, HELLO_MS = 60000, PROCESSES = 1024, STATUS_MS = 2000 };
+
+/* Bytes of what a process wrote to standard error that go to the log, from the first on: a message of abort() or of a
+ * failed assertion has some 200. */
+enum { SAID_MOST = 1000 };
 
 extern char **environ;
 
-/* Small messages over a socket of packets: a number and up to two descriptors. */
+/* Small messages over a socket of packets: a number and up to three descriptors. */
 static int tell(int fd, int number, const int *passed, int count) {
   char control[CMSG_SPACE(PASSED_MOST * sizeof(int))] = {0};
   struct iovec part = {&number, sizeof number};
@@ -135,10 +139,16 @@ static void bury(void) {
   }
 }
 
-_Noreturn static void become_process(int channel, pid_t zygote, void (*work)(int channel)) {
+_Noreturn static void become_process(int channel, int said, pid_t zygote, void (*work)(int channel)) {
   int kept = fcntl(channel, F_DUPFD_CLOEXEC, 64);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (kept < 0 || getppid() != zygote || dup2(kept, ISOLATE_FD) != ISOLATE_FD) {
+    _exit(1);
+  }
+  /* The zygote's standard error is the log, where a process could forge lines. Reports of the sanitizers go there
+   * whole.
+   */
+  if (!SANDBOX_SANITIZED && dup2(said, STDERR_FILENO) != STDERR_FILENO) {
     _exit(1);
   }
   signal(SIGCHLD, SIG_DFL);
@@ -162,10 +172,11 @@ static void fork_one(int passed[PASSED_MOST], void (*work)(int channel)) {
   if (slot < PROCESSES) {
     pid = FORK();
     if (pid == 0) {
-      become_process(passed[0], zygote, work);
+      become_process(passed[0], passed[2], zygote, work);
     }
   }
   close(passed[0]);
+  close(passed[2]);
   if (pid > 0) {
     pidfd = (int)syscall(SYS_pidfd_open, pid, 0);
     processes[slot] = (struct process){pid, passed[1]};
@@ -343,8 +354,8 @@ int isolate_is_on(void) {
   return __atomic_load_n(&own.mode, __ATOMIC_RELAXED) != ISOLATE_OFF;
 }
 
-static int fork_process(isolated *p, int channel, int status) {
-  int number = 0, holds, got[PASSED_MOST], passed[PASSED_MOST] = {channel, status};
+static int fork_process(isolated *p, const int passed[PASSED_MOST]) {
+  int number = 0, holds, got[PASSED_MOST];
   for (int tries = 0; tries < 2; tries++) {
     if (own.fd < 0 && !start_zygote(&holds)) {
       return 0;
@@ -361,24 +372,40 @@ static int fork_process(isolated *p, int channel, int status) {
   return 0;
 }
 
-int isolate_open(isolated *p, orb_context *ctx) {
-  int channel[2], status[2];
-  *p = (isolated){.channel = -1, .status = -1, .pidfd = -1, .ctx = ctx};
-  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, channel) != 0) {
+/* Makes the pairs of descriptors, of which the daemon keeps one each. 0: nothing is open. */
+static int open_pairs(isolated *p, int passed[PASSED_MOST]) {
+  int pairs[PASSED_MOST][2];
+  int made = socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pairs[0]) == 0;
+  made += made == 1 && pipe2(pairs[1], O_CLOEXEC) == 0;
+  made += made == 2 && pipe2(pairs[2], O_CLOEXEC | O_NONBLOCK) == 0; /* the process loses what does not fit */
+  for (int i = 0; i < made; i++) {
+    if (made < PASSED_MOST) {
+      close(pairs[i][0]);
+      close(pairs[i][1]);
+    }
+    passed[i] = pairs[i][1];
+  }
+  if (made < PASSED_MOST) {
     return 0;
   }
-  if (pipe2(status, O_CLOEXEC) != 0) {
-    close(channel[0]);
-    close(channel[1]);
+  p->channel = pairs[0][0];
+  p->status = pairs[1][0];
+  p->said = pairs[2][0];
+  return 1;
+}
+
+int isolate_open(isolated *p, orb_context *ctx) {
+  int passed[PASSED_MOST];
+  *p = (isolated){.channel = -1, .status = -1, .pidfd = -1, .said = -1, .ctx = ctx};
+  if (!open_pairs(p, passed)) {
     return 0;
   }
   pthread_mutex_lock(&own.lock);
-  int fine = fork_process(p, channel[1], status[1]);
+  int fine = fork_process(p, passed);
   pthread_mutex_unlock(&own.lock);
-  close(channel[1]);
-  close(status[1]);
-  p->channel = channel[0];
-  p->status = status[0];
+  for (int i = 0; i < PASSED_MOST; i++) {
+    close(passed[i]);
+  }
   if (!fine) {
     log_error("no process could be forked for a job");
     isolate_close(p);
@@ -402,6 +429,22 @@ channel_result isolate_receive(isolated *p, size_t most, frame *out) {
   return channel_receive(p->channel, most, out, continues, p);
 }
 
+/* Logs what a process wrote to standard error as a part of a line. */
+static void log_said(int said) {
+  char text[SAID_MOST + 1];
+  api_text fields = {0};
+  ssize_t size = read(said, text, SAID_MOST);
+  if (size <= 0) {
+    return;
+  }
+  text[size] = 0;
+  api_json_member_string(&fields, "wrote", text);
+  if (!fields.failed) {
+    log_write(LOG_WARN, fields.data, "a process of a job or a check wrote to its standard error");
+  }
+  api_text_free(&fields);
+}
+
 int isolate_close(isolated *p) {
   int status = -1;
   if (p->channel >= 0) {
@@ -421,7 +464,11 @@ int isolate_close(isolated *p) {
   if (p->pidfd >= 0) {
     close(p->pidfd);
   }
-  *p = (isolated){.channel = -1, .status = -1, .pidfd = -1};
+  if (p->said >= 0) {
+    log_said(p->said);
+    close(p->said);
+  }
+  *p = (isolated){.channel = -1, .status = -1, .pidfd = -1, .said = -1};
   return status;
 }
 

@@ -41,7 +41,8 @@ enum {
   STAGES = '6',
   STRANGE_STAGE = '7',
   SIGNALS = '8',
-  FILES = '9'
+  FILES = '9',
+  FORGED = '0'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -212,6 +213,20 @@ _Noreturn static void keep_files(int channel, const task_head *task) {
   _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
 }
 
+/* Writes lines that look like the daemon's, more than a pipe holds. */
+_Noreturn static void forge(int channel, const task_head *task) {
+  static const char line[] = "{\"audit\":\"delete\",\"token\":\"root\"}\n";
+  enum { LINES = 5000 };
+  done_head done = {.problem = "corrupt"};
+  const struct iovec part = {&done, sizeof done};
+  task_confine(task);
+  for (int i = 0; i < LINES; i++) {
+    ssize_t written = write(STDERR_FILENO, line, sizeof line - 1);
+    (void)written;
+  }
+  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
+}
+
 /* Tries to choose who gets the signals of a descriptor, and which, and says what worked. */
 _Noreturn static void send_signals(int channel, const task_head *task) {
   done_head done = {.problem = "corrupt"};
@@ -289,6 +304,8 @@ static void evil(int channel) {
       send_signals(channel, &task);
     case FILES:
       keep_files(channel, &task);
+    case FORGED:
+      forge(channel, &task);
     default:
       break;
   }
@@ -482,6 +499,35 @@ static void test_a_process_that_keeps_files(void **state) {
   api_problem_free(&problem);
 }
 
+/* What a process writes to standard error is part of a line of the log, and no line by itself. */
+static void test_lines_that_look_like_those_of_the_log(void **state) {
+  static const char before[] = "{\"time\":\"", within[] = "\"wrote\":\"{\\\"audit\\\":\\\"delete\\\"";
+  api_problem problem = {0};
+  isolated_end end;
+  char text[65536];
+  if (SANDBOX_SANITIZED) {
+    skip(); /* reports of the sanitizers go to the log as they are */
+  }
+  const int log = memfd_create("log", MFD_CLOEXEC), kept = dup(STDERR_FILENO);
+  assert_true(log >= 0 && kept >= 0);
+  isolate_stop();
+  dup2(log, STDERR_FILENO);
+  log_setup(LOG_WARN, 1);
+  const int starts = isolate_start(ISOLATE_ON), fine = starts && run(*state, FORGED, &problem, &end);
+  log_setup(LOG_ERROR, 0);
+  dup2(kept, STDERR_FILENO);
+  const ssize_t size = pread(log, text, sizeof text - 1, 0);
+  close(kept);
+  close(log);
+  assert_true(starts && !fine && size > 0);
+  text[size] = 0;
+  assert_ptr_equal(strchr(text, '\n'), text + size - 1); /* a single line */
+  assert_memory_equal(text, before, sizeof before - 1);
+  assert_non_null(strstr(text, within));
+  assert_in_range(size, 1, 4096);
+  api_problem_free(&problem);
+}
+
 /* Signals that the kernel sends for a descriptor reach any process of the same user. */
 static void test_a_process_that_sends_signals(void **state) {
   api_problem problem = {0};
@@ -509,6 +555,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test_setup_teardown(test_a_process_that_takes_all_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_sends_signals, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_keeps_files, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_lines_that_look_like_those_of_the_log, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
