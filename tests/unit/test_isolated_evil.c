@@ -1,17 +1,13 @@
 /* What a job's process can do to the daemon if a mesh has taken it over. This program is its own zygote, whose
  * processes do what the request says. */
-#include <fcntl.h>
 #include <setjmp.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/ioctl.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -20,7 +16,6 @@
 #include <sodium.h>
 
 #include "api/json.h"
-#include "isolate/sandbox.h"
 #include "isolate/task.h"
 #include "log.h"
 #include "store/owners.h"
@@ -36,13 +31,9 @@ enum {
   LONG_REFUSAL = '1',
   MANY_VALUES = '2',
   LARGE_ALIGNMENT = '3',
-  GREEDY = '4',
-  FLOOD = '5',
-  STAGES = '6',
-  STRANGE_STAGE = '7',
-  SIGNALS = '8',
-  FILES = '9',
-  FORGED = '0'
+  FLOOD = '4',
+  STAGES = '5',
+  STRANGE_STAGE = '6'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -144,102 +135,6 @@ _Noreturn static void send_large_alignment(int channel, const char *text) {
   _exit(0);
 }
 
-/* Takes all memory that it gets, and says how many megabytes. */
-_Noreturn static void take_all(int channel, const task_head *task) {
-  done_head done = {.problem = "corrupt"};
-  int megabytes = 0;
-  task_confine(task);
-  for (char *at; megabytes < 4096 && (at = malloc(1 << 20)); megabytes++) {
-    memset(at, 1, 1 << 20);
-  }
-  snprintf(done.detail, sizeof done.detail, "%d", megabytes);
-  const struct iovec part = {&done, sizeof done};
-  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
-}
-
-/* Writes megabytes until the kernel refuses. */
-static int fill_file(int fd) {
-  static char block[1 << 20];
-  int megabytes = 0;
-  for (ssize_t n; megabytes < 256 && (n = write(fd, block, sizeof block)) == sizeof block;) {
-    megabytes++;
-  }
-  return megabytes;
-}
-
-/* Takes mappings that RLIMIT_DATA does not count. */
-static int fill_mapping(int flags) {
-  enum { BYTES = 16 << 20 };
-  int megabytes = 0;
-  for (char *at; (at = mmap(NULL, BYTES, PROT_READ | PROT_WRITE, flags | MAP_ANONYMOUS, -1, 0)) != MAP_FAILED;) {
-    memset(at, 1, BYTES);
-    megabytes += BYTES >> 20;
-  }
-  return megabytes;
-}
-
-/* Keeps memory that it no longer can write to. */
-static int fill_read_only(void) {
-  enum { BYTES = 1 << 20, TIMES = 1024 };
-  int megabytes = 0;
-  for (char *at; megabytes < TIMES &&
-                 (at = mmap(NULL, BYTES, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)) != MAP_FAILED;) {
-    memset(at, 1, BYTES);
-    if (mprotect(at, BYTES, PROT_READ) != 0) {
-      break;
-    }
-    megabytes++;
-  }
-  return megabytes;
-}
-
-/* Keeps memory in files, and in mappings that are no data of the process, and says how many megabytes. */
-_Noreturn static void keep_files(int channel, const task_head *task) {
-  enum { FILES_MOST = 20 };
-  done_head done = {.problem = "corrupt"};
-  signal(SIGXFSZ, SIG_IGN);
-  const int results = task_confine(task);
-  int made = 0, megabytes = results >= 0 ? fill_file(results) : 0;
-  for (int i = 0; i < FILES_MOST; i++) {
-    const int fd = memfd_create("more", 0);
-    if (fd >= 0) {
-      made++;
-      megabytes += fill_file(fd);
-    }
-  }
-  const int mapped = fill_read_only() + fill_mapping(MAP_SHARED) + fill_mapping(MAP_PRIVATE | MAP_GROWSDOWN);
-  snprintf(done.detail, sizeof done.detail, "%d %d %d", megabytes, made, mapped);
-  const struct iovec part = {&done, sizeof done};
-  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
-}
-
-/* Writes lines that look like the daemon's, more than a pipe holds. */
-_Noreturn static void forge(int channel, const task_head *task) {
-  static const char line[] = "{\"audit\":\"delete\",\"token\":\"root\"}\n";
-  enum { LINES = 5000 };
-  done_head done = {.problem = "corrupt"};
-  const struct iovec part = {&done, sizeof done};
-  task_confine(task);
-  for (int i = 0; i < LINES; i++) {
-    ssize_t written = write(STDERR_FILENO, line, sizeof line - 1);
-    (void)written;
-  }
-  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
-}
-
-/* Tries to choose who gets the signals of a descriptor, and which, and says what worked. */
-_Noreturn static void send_signals(int channel, const task_head *task) {
-  done_head done = {.problem = "corrupt"};
-  struct f_owner_ex owner = {.type = F_OWNER_PID, .pid = getppid()};
-  int number = getppid();
-  task_confine(task);
-  snprintf(done.detail, sizeof done.detail, "%d %d %d %d %d %d", fcntl(channel, F_SETOWN, number),
-           fcntl(channel, F_SETOWN_EX, &owner), fcntl(channel, F_SETSIG, SIGUSR1), fcntl(channel, F_SETFL, O_ASYNC),
-           ioctl(channel, FIOSETOWN, &number), prctl(PR_SET_PDEATHSIG, SIGUSR1));
-  const struct iovec part = {&done, sizeof done};
-  _exit(channel_send(channel, FRAME_DONE, &part, 1, -1, NULL, NULL) == CHANNEL_OK ? 0 : 9);
-}
-
 /* A result that says that it has no bytes, so that no quota counts it. */
 _Noreturn static void claim_no_bytes(int channel, const task_head *task) {
   done_head done = {.fine = 1};
@@ -298,14 +193,6 @@ static void evil(int channel) {
       refuse_at_length(channel, 2 * VALUES);
     case LARGE_ALIGNMENT:
       send_large_alignment(channel, request);
-    case GREEDY:
-      take_all(channel, &task);
-    case SIGNALS:
-      send_signals(channel, &task);
-    case FILES:
-      keep_files(channel, &task);
-    case FORGED:
-      forge(channel, &task);
     default:
       break;
   }
@@ -466,81 +353,6 @@ static void test_a_result_that_says_it_has_no_bytes(void **state) {
   assert_true(end.died);
 }
 
-/* The kernel gives a process twice its budget (64 MB here), and what a small one needs beside it. */
-static void test_a_process_that_takes_all_memory(void **state) {
-  api_problem problem = {0};
-  isolated_end end;
-  if (SANDBOX_SANITIZED) {
-    skip(); /* no limit on memory */
-  }
-  assert_false(run(*state, GREEDY, &problem, &end));
-  assert_string_equal(problem.name, "corrupt");
-  const int megabytes = atoi(problem.detail);
-  print_message("%d MB\n", megabytes);
-  assert_in_range(megabytes, 64, 2 * 64 + 80);
-  api_problem_free(&problem);
-}
-
-/* A process has one file in memory, with as many bytes as its budget and its inputs (64 MB and none here). */
-static void test_a_process_that_keeps_files(void **state) {
-  api_problem problem = {0};
-  isolated_end end;
-  int megabytes, files, mapped;
-  if (SANDBOX_SANITIZED) {
-    skip(); /* no filter of system calls */
-  }
-  assert_false(run(*state, FILES, &problem, &end));
-  assert_string_equal(problem.name, "corrupt");
-  print_message("%s\n", problem.detail);
-  assert_int_equal(sscanf(problem.detail, "%d %d %d", &megabytes, &files, &mapped), 3);
-  assert_int_equal(megabytes, 64);
-  assert_int_equal(files, 0);
-  assert_int_equal(mapped, 0);
-  api_problem_free(&problem);
-}
-
-/* What a process writes to standard error is part of a line of the log, and no line by itself. */
-static void test_lines_that_look_like_those_of_the_log(void **state) {
-  static const char before[] = "{\"time\":\"", within[] = "\"wrote\":\"{\\\"audit\\\":\\\"delete\\\"";
-  api_problem problem = {0};
-  isolated_end end;
-  char text[65536];
-  if (SANDBOX_SANITIZED) {
-    skip(); /* reports of the sanitizers go to the log as they are */
-  }
-  const int log = memfd_create("log", MFD_CLOEXEC), kept = dup(STDERR_FILENO);
-  assert_true(log >= 0 && kept >= 0);
-  isolate_stop();
-  dup2(log, STDERR_FILENO);
-  log_setup(LOG_WARN, 1);
-  const int starts = isolate_start(ISOLATE_ON), fine = starts && run(*state, FORGED, &problem, &end);
-  log_setup(LOG_ERROR, 0);
-  dup2(kept, STDERR_FILENO);
-  const ssize_t size = pread(log, text, sizeof text - 1, 0);
-  close(kept);
-  close(log);
-  assert_true(starts && !fine && size > 0);
-  text[size] = 0;
-  assert_ptr_equal(strchr(text, '\n'), text + size - 1); /* a single line */
-  assert_memory_equal(text, before, sizeof before - 1);
-  assert_non_null(strstr(text, within));
-  assert_in_range(size, 1, 4096);
-  api_problem_free(&problem);
-}
-
-/* Signals that the kernel sends for a descriptor reach any process of the same user. */
-static void test_a_process_that_sends_signals(void **state) {
-  api_problem problem = {0};
-  isolated_end end;
-  if (SANDBOX_SANITIZED) {
-    skip(); /* no filter of system calls */
-  }
-  assert_false(run(*state, SIGNALS, &problem, &end));
-  assert_string_equal(problem.name, "corrupt");
-  assert_string_equal(problem.detail, "-1 -1 -1 -1 -1 -1");
-  api_problem_free(&problem);
-}
-
 int main(int count, char **arguments) {
   if (count > 1 && strcmp(arguments[1], ISOLATE_FLAG) == 0) {
     isolate_zygote(evil);
@@ -552,10 +364,6 @@ int main(int count, char **arguments) {
       cmocka_unit_test_setup_teardown(test_reports_without_end, setup, teardown),
       cmocka_unit_test(test_a_stop_while_bytes_arrive),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_a_process_that_takes_all_memory, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_a_process_that_sends_signals, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_a_process_that_keeps_files, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_lines_that_look_like_those_of_the_log, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
