@@ -20,8 +20,8 @@
 /* Brings the objects of a catalogue from one folder to another. */
 typedef struct haul {
   objects *from, *to;
+  const char *place; /* what `to` is */
   snapshot *rows;
-  int links;
   long objects, made, wrong, deleted;
   const char *stopped; /* why nothing more can be written; NULL: it can */
 } haul;
@@ -95,11 +95,15 @@ static void bring_row(void *user, const resource *row) {
   named_object named[RESOURCE_OBJECTS];
   int count = resource_objects(row, named);
   for (int i = 0; i < count && !h->stopped; i++) {
-    int made;
-    store_result result = transfer_object(h->from, h->to, row->id, &named[i], h->links, &made);
+    transfer_deed deed;
+    store_result result = transfer_object(h->from, h->to, row->id, &named[i], &deed);
     h->objects++;
-    h->made += made;
+    h->made += deed != TRANSFER_NONE;
     h->stopped = result == STORE_FULL ? "has no space left" : result == STORE_ERROR ? "cannot be written" : NULL;
+    if (deed == TRANSFER_MENDED) {
+      printf("%s %s: %s in the %s was damaged and is copied again\n", names[row->kind], row->id, named[i].what,
+             h->place);
+    }
     if (result != STORE_OK && !h->stopped) {
       h->wrong++;
       printf("%s %s: %s %s\n", names[row->kind], row->id, named[i].what,
@@ -146,7 +150,7 @@ static int hold_deletions(const char *data) {
 
 static int take(const char *folder, const char *data) {
   char path[PATH_MAX];
-  haul h = {.links = 1};
+  haul h = {.place = "backup"};
   snprintf(path, sizeof path, "%s/%s", folder, place_new_catalogue);
   int fine = snapshot_take(data, path) == STORE_OK && objects_open_read_only(data, &h.from) == STORE_OK &&
              objects_open(folder, &h.to) == STORE_OK && bring_objects(&h, folder) && commit(folder) &&
@@ -254,7 +258,7 @@ static int begin_filling(const char *data) {
 /* What a restore that was killed has brought stays, unless this backup does not name it. */
 static int put_back(const char *folder, const char *data) {
   char path[PATH_MAX];
-  haul h = {0};
+  haul h = {.place = "new folder"};
   snprintf(path, sizeof path, "%s/%s", data, place_new_catalogue);
   int fine = snapshot_take(folder, path) == STORE_OK && snapshot_requeue(path) == STORE_OK &&
              objects_open_read_only(folder, &h.from) == STORE_OK && objects_open(data, &h.to) == STORE_OK &&

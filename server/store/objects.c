@@ -39,10 +39,6 @@ int objects_read_name(const char *name, object_kind *kind, const char **id) {
   return 0;
 }
 
-store_result objects_make_folder(const objects *store, object_kind kind, const char *id) {
-  return object_file_make_folder(store->root, kind, id);
-}
-
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]) {
   object_file_path(store->root, kind, id, out);
 }

@@ -95,8 +95,6 @@ void objects_name(object_kind kind, const char *id, char out[OBJECT_NAME]);
 int objects_read_name(const char *name, object_kind *kind, const char **id);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
-/* Makes the folder of that file unless it exists. */
-store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
 /* Opens the lock file of backups. A backup holds it exclusively (flock()), so the kernel releases it with the process;
  * a thread that deletes an object shares it for that moment. −1 with the reason logged. */

@@ -1,7 +1,6 @@
 #include "store/transfer.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,28 +17,19 @@ enum { BLOCK = 1 << 20 };
 /* What transfer_object() works on. */
 typedef struct transfer {
   int source;
-  struct stat info;    /* of the source */
-  char path[PATH_MAX]; /* of the object in `to` */
+  struct stat info; /* of the source */
   const char *id;
   const named_object *object;
 } transfer;
 
-static int is_there(const transfer *t) {
-  struct stat there;
-  return stat(t->path, &there) == 0 &&
-         ((there.st_ino == t->info.st_ino && there.st_dev == t->info.st_dev) ||
-          (there.st_size == t->info.st_size && there.st_mtim.tv_sec == t->info.st_mtim.tv_sec &&
-           there.st_mtim.tv_nsec == t->info.st_mtim.tv_nsec));
-}
-
-/* Reads the source once: hashes it, and appends it to `copy` unless that is NULL. */
-static store_result read_source(const transfer *t, object_temp *copy, char sha[API_ID_SIZE]) {
+/* Reads a file of the source's size once: hashes it, and appends it to `copy` unless that is NULL. */
+static store_result read_file(const transfer *t, int fd, object_temp *copy, char sha[API_ID_SIZE]) {
   unsigned char digest[crypto_hash_sha256_BYTES], *block = malloc(BLOCK);
   crypto_hash_sha256_state state;
   store_result result = block ? STORE_OK : STORE_ERROR;
   crypto_hash_sha256_init(&state);
   for (off_t at = 0; result == STORE_OK && at < t->info.st_size;) {
-    ssize_t n = pread(t->source, block, BLOCK, at);
+    ssize_t n = pread(fd, block, BLOCK, at);
     if (n < 0 && errno == EINTR) {
       continue;
     }
@@ -60,44 +50,51 @@ static store_result read_source(const transfer *t, object_temp *copy, char sha[A
   return result;
 }
 
-/* STORE_CONFLICT: the object has another hash than it should have. */
-static store_result compare(const transfer *t, const objects *from, const char *sha) {
+/* STORE_CONFLICT: the object in this file has another hash than it should have. sha: of the file. */
+static store_result compare(const transfer *t, int fd, const char *sha) {
   if (t->object->kind == OBJECT_SPHERES) { /* the file itself has its hash */
-    return spheres_check(from, t->id);
+    return spheres_check_file(fd, (uint64_t)t->info.st_size);
   }
   return !t->object->sha[0] || strcmp(sha, t->object->sha) == 0 ? STORE_OK : STORE_CONFLICT;
 }
 
-/* 1: linked; 0: the file systems do not allow it, or it failed. Deletes a name that a killed backup has left. */
-static int link_to(const transfer *t, const objects *to) {
-  char source[64], temp[PATH_MAX];
-  snprintf(source, sizeof source, "/proc/self/fd/%d",
-           t->source); /* the file that was read, even if another one has its name now */
-  if (snprintf(temp, sizeof temp, "%s.new", t->path) >= (int)sizeof temp) {
-    return 0;
-  }
-  unlink(temp);
-  if (linkat(AT_FDCWD, source, AT_FDCWD, temp, AT_SYMLINK_FOLLOW) != 0 &&
-      (errno != ENOENT || objects_make_folder(to, t->object->kind, t->id) != STORE_OK ||
-       linkat(AT_FDCWD, source, AT_FDCWD, temp, AT_SYMLINK_FOLLOW) != 0)) {
-    return 0;
-  }
-  if (rename(temp, t->path) == 0) {
-    return 1;
-  }
-  unlink(temp);
-  return 0;
+static int has_size_and_time(const transfer *t, const struct stat *there) {
+  return there->st_size == t->info.st_size && there->st_mtim.tv_sec == t->info.st_mtim.tv_sec &&
+         there->st_mtim.tv_nsec == t->info.st_mtim.tv_nsec;
 }
 
-static store_result copy_to(const transfer *t, const objects *from, objects *to) {
+/* Whether the same file has a name in both stores, as backups of an earlier version made it. */
+static int is_link(const transfer *t, const struct stat *there) {
+  return there->st_ino == t->info.st_ino && there->st_dev == t->info.st_dev;
+}
+
+/* What has to be done. A copy that would stay is read, because no one else reads the objects of a backup: damage of its
+ * disk can be mended only as long as the source has the object. */
+static transfer_deed find_deed(const transfer *t, const objects *to) {
+  int fd;
+  uint64_t size;
+  char sha[API_ID_SIZE];
+  struct stat there;
+  transfer_deed deed = TRANSFER_NEW;
+  if (objects_read(to, t->object->kind, t->id, &fd, &size) != STORE_OK) {
+    return deed;
+  }
+  if (fstat(fd, &there) == 0 && !is_link(t, &there) && has_size_and_time(t, &there)) {
+    deed = read_file(t, fd, NULL, sha) == STORE_OK && compare(t, fd, sha) == STORE_OK ? TRANSFER_NONE : TRANSFER_MENDED;
+  }
+  close(fd);
+  return deed;
+}
+
+static store_result copy_to(const transfer *t, objects *to) {
   object_temp copy;
   char sha[API_ID_SIZE];
   const struct timespec times[2] = {t->info.st_atim, t->info.st_mtim};
   store_result result = objects_begin(to, &copy);
   if (result == STORE_OK) {
-    result = read_source(t, &copy, sha);
+    result = read_file(t, t->source, &copy, sha);
     if (result == STORE_OK) {
-      result = compare(t, from, sha);
+      result = compare(t, t->source, sha);
     }
     if (result == STORE_OK) {
       futimens(copy.fd, times); /* by which the next backup recognises it */
@@ -108,29 +105,24 @@ static store_result copy_to(const transfer *t, const objects *from, objects *to)
   return result;
 }
 
-store_result transfer_object(const objects *from, objects *to, const char *id, const named_object *object, int links,
-                             int *made) {
+store_result transfer_object(const objects *from, objects *to, const char *id, const named_object *object,
+                             transfer_deed *deed) {
   transfer t = {.id = id, .object = object};
-  char sha[API_ID_SIZE];
   uint64_t size;
-  *made = 0;
+  *deed = TRANSFER_NONE;
   store_result result = objects_read(from, object->kind, id, &t.source, &size);
   if (result != STORE_OK) {
     return result;
   }
-  objects_path(to, object->kind, id, t.path);
   if (fstat(t.source, &t.info) != 0) {
     result = STORE_ERROR;
-  } else if (!is_there(&t)) {
-    FAULT_POINT("transfer");
-    result = links ? read_source(&t, NULL, sha) : STORE_OK;
-    if (result == STORE_OK && links) {
-      result = compare(&t, from, sha);
+  } else {
+    const transfer_deed needed = find_deed(&t, to);
+    if (needed != TRANSFER_NONE) {
+      FAULT_POINT("transfer");
+      result = copy_to(&t, to);
+      *deed = result == STORE_OK ? needed : TRANSFER_NONE;
     }
-    if (result == STORE_OK && !(links && link_to(&t, to))) {
-      result = copy_to(&t, from, to);
-    }
-    *made = result == STORE_OK;
   }
   close(t.source);
   return result;

@@ -4,12 +4,18 @@
 
 #include "store/catalogue.h"
 
-/* Copies an object from `from` to `to`, unless `to` has the same file, or one of the same size and time. Its bytes
- * are compared with the hash first, so a damaged object never replaces another. links: by hard link where the file
- * systems allow it, else by a copy that is on the disk when this returns; the caller syncs the folders.
- * *made: whether the object was copied.
+typedef enum transfer_deed {
+  TRANSFER_NONE,  /* no copy was made: `to` has the object, or it failed */
+  TRANSFER_NEW,   /* `to` lacked the object, or had one of another size or time */
+  TRANSFER_MENDED /* `to` had a copy that did not match its hash */
+} transfer_deed;
+
+/* Copies an object from `from` to `to`, unless `to` has a copy of the same size and time. All bytes are compared with
+ * the hash first: those of the source before they are published, so a damaged object never replaces another, and else
+ * those of the copy that stays. A hard link to the source is no copy. A copy is on the disk when this returns; the
+ * caller syncs the folders.
  * STORE_NOT_FOUND: `from` lacks it. STORE_CONFLICT: it does not match its hash. */
-store_result transfer_object(const objects *from, objects *to, const char *id, const named_object *object, int links,
-                             int *made);
+store_result transfer_object(const objects *from, objects *to, const char *id, const named_object *object,
+                             transfer_deed *deed);
 
 #endif

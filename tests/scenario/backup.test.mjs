@@ -1,7 +1,19 @@
 // Backs up a data folder that a daemon serves, and checks what is restored.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
-import { existsSync, mkdirSync, readdirSync, readFileSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { spawn, spawnSync } from 'node:child_process';
+import {
+  closeSync,
+  existsSync,
+  linkSync,
+  mkdirSync,
+  openSync,
+  readdirSync,
+  readFileSync,
+  rmSync,
+  statSync,
+  writeFileSync,
+  writeSync,
+} from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
 import { mesh, sha256, trap, watching } from './support/backup.mjs';
@@ -153,8 +165,7 @@ test('a backup and a restore refuse what they would overwrite, and report damage
   const bad = object(d.data, 'mesh', a.id);
   const bytes = readFileSync(bad);
   bytes[bytes.length >> 1] ^= 1;
-  writeFileSync(`${bad}.x`, bytes); // another file: the backup may have linked this one
-  renameSync(`${bad}.x`, bad);
+  writeFileSync(bad, bytes);
   const again = await run('backup', backup, '--data', d.data);
   assert.equal(again.code, 1);
   assert.match(again.out, new RegExp(`^mesh ${a.id}: its object does not match its hash$`, 'm'));
@@ -177,6 +188,59 @@ test('a backup and a restore refuse what they would overwrite, and report damage
   assert.equal((await other.get(`${a.url}/file`)).bytes.toString(), mesh(0));
   assert.equal((await other.upload(mesh(1))).status, 200, 'sending it again completes the service');
   assert.equal((await other.get(`${b.url}/file`)).bytes.toString(), mesh(1));
+});
+
+/** Changes one byte where it lies, as a disk that fails does: neither the inode, the size nor the time change. */
+function rot(file) {
+  const bytes = readFileSync(file);
+  const at = bytes.length >> 1;
+  const time = `${file}.time`; // of the file, to the nanosecond
+  assert.equal(spawnSync('touch', ['-r', file, time]).status, 0);
+  const fd = openSync(file, 'r+');
+  writeSync(fd, Buffer.from([bytes[at] ^ 1]), 0, 1, at);
+  closeSync(fd);
+  assert.equal(spawnSync('touch', ['-r', time, file]).status, 0);
+  rmSync(time);
+}
+
+test('a backup is a copy, and each backup verifies all that it keeps', async (t) => {
+  const d = await daemon(t, { args: ['--scrub-rate', '0'] });
+  const place = await folder(t);
+  const [backup, fresh] = [path.join(place, 'backup'), path.join(place, 'new')];
+  const again = () => run('backup', backup, '--data', d.data);
+  const [a, b, c] = (await Promise.all([0, 1, 2].map((k) => d.upload(mesh(k))))).map((reply) => reply.json);
+  const copy = ({ id }) => object(backup, 'mesh', id);
+  const kept = (m, k) => assert.equal(readFileSync(copy(m), 'utf8'), mesh(k));
+  assert.equal((await again()).code, 0);
+
+  // A byte of the service flips: the backup has its own.
+  rot(object(d.data, 'mesh', a.id));
+  kept(a, 0);
+  assert.equal((await again()).code, 0);
+  kept(a, 0);
+
+  // A byte of the backup flips: the next one finds it, and copies the object again.
+  rot(copy(b));
+  const mended = await again();
+  assert.equal(mended.code, 0, mended.out + mended.err);
+  assert.match(mended.out, new RegExp(`^mesh ${b.id}: its object in the backup was damaged and is copied again$`, 'm'));
+  assert.match(mended.out, /^3 objects in the backup: 1 new, 0 deleted that the last backup had, 0 damaged/m);
+  kept(b, 1);
+
+  // A backup of hard links, as earlier versions made them, becomes one of copies.
+  rmSync(copy(c));
+  linkSync(object(d.data, 'mesh', c.id), copy(c));
+  assert.equal((await again()).code, 0);
+  rot(object(d.data, 'mesh', c.id));
+  kept(c, 2);
+
+  // Both flip: no backup calls that healthy.
+  rot(copy(c));
+  const lost = await again();
+  assert.equal(lost.code, 1);
+  assert.match(lost.out, new RegExp(`^mesh ${c.id}: its object does not match its hash$`, 'm'));
+  rot(copy(c));
+  assert.equal((await run('restore', backup, '--data', fresh)).code, 0);
 });
 
 /** No program takes a folder for data while a restore into it has not ended. */
