@@ -1,12 +1,7 @@
 /* Short cycles that do not divide the surface.
  *
- * A spanning tree of the vertices and one of the faces that crosses none of its edges leave 2·genus edges over, one for
- * each generator of the homology (tree–cotree decomposition, Eppstein 2003). Each generator gets a random 64-bit word.
- * The label of an edge is the XOR of the words whose dual cycles cross it: a cocycle, so the XOR along a closed walk
- * depends on the walk's homology class only and is 0 where the walk divides the surface or is contractible (annotation,
- * Busaryev, Cabello, Chen, Dey and Wang 2012). A label that is not 0 proves that the cycle does not divide; a class
- * that is not 0 has the label 0 with a chance of 2⁻⁶⁴. Cycles that share no vertex leave the surface connected if and
- * only if their classes are independent, and they are if their labels are.
+ * Each edge has a label (labels.h). One that is not 0 proves that the cycle does not divide. Cycles that share no
+ * vertex leave the surface connected if and only if their classes are independent, and they are if their labels are.
  *
  * Each cycle that does not divide the surface passes an edge whose label is not 0. The shortest one through a vertex of
  * such an edge consists of two shortest paths from there and an edge (Erickson and Whittlesey 2005).
@@ -17,9 +12,11 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "base/grow.h"
 #include "base/memory.h"
 #include "mesh/dijkstra.h"
+#include "mesh/labels.h"
 #include "mesh/sort.h"
 
 /* Searches without a limit cover the whole surface: this many vertices in all, and WHOLE_LEAST searches at least. */
@@ -27,30 +24,37 @@ enum { WHOLE_VERTICES = 4000000, WHOLE_LEAST = 8 };
 /* The searches near generators settle this many vertices in all, and at least NEAR_LEAST each: about a second's work at
  * most, which finds loops of some ten edges. */
 enum { NEAR_VERTICES = 6000000, NEAR_LEAST = 64 };
+/* Searches that settle more vertices than this (loops of some 20 edges or more) are shared with the seeds around;
+ * others cost little, so each seed has its own. SLACK: how much longer than need be a long loop may become, relative.
+ * The larger, the fewer searches: their number along a line of seeds is the line's length over half of it. */
+enum { LONG_SEARCH = 256 };
+static const double SLACK = 0.125;
+enum { ROUND = 2 };                  /* what labels and a cut cost, in settled vertices for each triangle */
 enum { GENERATORS_MOST = 16000000 }; /* edges of all generators that are kept beside those searches: 64 MB */
 enum { CHECK_EVERY = 256, SETTLED_EVERY = 65536 }; /* cycles and settled vertices between looks at the deadline */
 
 typedef struct work {
   orb_dijkstra p;
-  unsigned char *in; /* of each half-edge: TREE, COTREE */
   int32_t *seed, seed_count;
-  int32_t *left, left_count; /* half-edges of neither tree */
+  int32_t *left, left_count; /* half-edges, one for each generator */
+  unsigned char *passed;     /* of each vertex: its shortest cycle is not wanted */
+  int64_t settled;           /* by the last search */
+  int64_t *allowed;          /* vertices that searches may still settle; NULL: any number */
   orb_cycle *found;
   int32_t found_count, found_room;
   int32_t *pool;
   int32_t pool_count, pool_room;
 } work;
 
-enum { TREE = 1, COTREE = 2 };
-
 /* The shortest cycle through the seed that does not divide the surface and is shorter than *length: returns the
  * half-edge that closes it and updates *length; −1: there is none. most: vertices to settle. */
 static int32_t search(work *w, int32_t seed, int64_t most, double *length) {
   int32_t closing = -1;
   orb_dijkstra_start(&w->p, seed);
-  for (int64_t settled = 1; w->p.heap_count > 0 && settled <= most; settled++) {
+  for (w->settled = 0; w->p.heap_count > 0 && w->settled < most;) {
     int32_t v = orb_dijkstra_pop(&w->p);
-    int late = settled % SETTLED_EVERY == 0 && orb_context_check(w->p.s->ctx) != ORB_OK; /* the caller asks again */
+    int late =
+        ++w->settled % SETTLED_EVERY == 0 && orb_context_check(w->p.s->ctx) != ORB_OK; /* the caller asks again */
     if (late || 2 * w->p.distance[v] >= *length) {
       break;
     }
@@ -70,147 +74,6 @@ static int32_t search(work *w, int32_t seed, int64_t most, double *length) {
     } while (h != w->p.corner[v]);
   }
   return closing;
-}
-
-/* The spanning tree of the vertices: shortest paths over usable edges, then any edge to the vertices that are left. */
-static orb_status grow_tree(work *w) {
-  const orb_mesh *mesh = w->p.s->mesh;
-  int32_t root = mesh->triangles[0];
-  memset(w->p.label, 0, 3 * (size_t)mesh->triangle_count * sizeof *w->p.label);
-  orb_dijkstra_start(&w->p, root);
-  for (int64_t n = 0; w->p.heap_count > 0; n++) {
-    int32_t v = orb_dijkstra_pop(&w->p), h = w->p.corner[v];
-    w->p.state[v] = ORB_DIJKSTRA_SETTLED;
-    do {
-      if (orb_dijkstra_is_usable(&w->p, h)) {
-        orb_dijkstra_reach(&w->p, h, w->p.distance[v] + orb_dijkstra_length(&w->p, h));
-      }
-      h = w->p.s->twin[orb_prev(h)];
-    } while (h != w->p.corner[v]);
-    if (n % 65536 == 0) {
-      ORB_TRY(orb_context_check(w->p.s->ctx));
-    }
-  }
-  for (int32_t i = 0; i < w->p.touched_count; i++) { /* grows while it runs */
-    int32_t v = w->p.touched[i], h = w->p.corner[v];
-    do {
-      int32_t to = orb_dijkstra_target(&w->p, h);
-      if (w->p.state[to] == ORB_DIJKSTRA_UNSEEN) {
-        w->p.state[to] = ORB_DIJKSTRA_WAITING; /* stays: its path has an edge that is not the file's */
-        w->p.distance[to] = w->p.distance[v] + orb_dijkstra_length(&w->p, h);
-        w->p.parent[to] = h;
-        w->p.walked[to] = 0;
-        w->p.touched[w->p.touched_count++] = to;
-      }
-      h = w->p.s->twin[orb_prev(h)];
-    } while (h != w->p.corner[v]);
-  }
-  for (int32_t i = 0; i < w->p.touched_count; i++) {
-    int32_t h = w->p.parent[w->p.touched[i]];
-    if (h >= 0) {
-      w->in[h] = w->in[w->p.s->twin[h]] = TREE;
-    }
-  }
-  return ORB_OK;
-}
-
-typedef struct cotree {
-  int32_t *queue, *stack, *arrival; /* faces as reached; those to spread first; the half-edge into each face */
-  int32_t tail, depth;
-  uint64_t *sum;
-} cotree;
-
-static void claim(work *w, cotree *c, int32_t h) {
-  int32_t g = w->p.s->twin[h];
-  if ((w->in[h] & TREE) || c->arrival[g / 3] != -2) {
-    return;
-  }
-  c->arrival[g / 3] = g;
-  w->in[h] = w->in[g] = COTREE;
-  c->queue[c->tail++] = g / 3;
-  if (w->p.s->mesh->source_triangle[g / 3] < 0) {
-    c->stack[c->depth++] = g / 3;
-  }
-}
-
-/* The spanning tree of the faces. Faces that a repair made are crossed first, so that usable edges are left over. */
-static void grow_cotree(work *w, cotree *c) {
-  for (int32_t t = 0; t < w->p.s->mesh->triangle_count; t++) {
-    c->arrival[t] = -2;
-  }
-  c->arrival[0] = -1;
-  c->queue[c->tail++] = 0;
-  if (w->p.s->mesh->source_triangle[0] < 0) {
-    c->stack[c->depth++] = 0;
-  }
-  for (int32_t head = 0; head < c->tail || c->depth > 0;) {
-    if (c->depth > 0) {
-      int32_t t = c->stack[--c->depth];
-      for (int32_t h = 3 * t; h < 3 * t + 3; h++) {
-        if (!orb_dijkstra_is_usable(&w->p, h)) {
-          claim(w, c, h);
-        }
-      }
-      continue;
-    }
-    int32_t t = c->queue[head++];
-    for (int32_t h = 3 * t; h < 3 * t + 3; h++) {
-      claim(w, c, h);
-    }
-  }
-}
-
-/* A word for each generator: splitmix64 (Steele, Lea and Flood 2014). */
-static uint64_t word_of(int32_t i) {
-  uint64_t x = ((uint64_t)i + 1) * 0x9e3779b97f4a7c15u;
-  x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ x >> 27) * 0x94d049bb133111ebu;
-  return x ^ x >> 31;
-}
-
-static void label_edges(work *w, cotree *c) {
-  int32_t half_edges = 3 * w->p.s->mesh->triangle_count;
-  for (int32_t h = 0; h < half_edges; h++) {
-    int32_t g = w->p.s->twin[h];
-    if (g < h || w->in[h]) {
-      continue;
-    }
-    uint64_t word = word_of(w->left_count);
-    w->left[w->left_count++] = h;
-    w->p.label[h] = w->p.label[g] = word;
-    c->sum[h / 3] ^= word;
-    c->sum[g / 3] ^= word;
-  }
-  for (int32_t i = c->tail; i-- > 1;) {
-    int32_t t = c->queue[i], h = c->arrival[t], g = w->p.s->twin[h];
-    w->p.label[h] = w->p.label[g] = c->sum[t];
-    c->sum[g / 3] ^= c->sum[t];
-  }
-}
-
-static orb_status find_labels(work *w) {
-  orb_context *ctx = w->p.s->ctx;
-  int32_t faces = w->p.s->mesh->triangle_count;
-  ORB_TRY(grow_tree(w));
-  cotree c = {.queue = ORB_NEW(ctx, int32_t, faces),
-              .stack = ORB_NEW(ctx, int32_t, faces),
-              .arrival = ORB_NEW(ctx, int32_t, faces),
-              .sum = ORB_NEW0(ctx, uint64_t, faces)};
-  orb_status status = c.queue && c.stack && c.arrival && c.sum ? ORB_OK : ORB_E_NO_MEMORY;
-  if (status == ORB_OK) {
-    grow_cotree(w, &c);
-    int64_t left = w->p.s->edges.edges - (w->p.touched_count - 1) - (faces - 1);
-    w->left = ORB_NEW(ctx, int32_t, left > 0 ? left : 0);
-    status = w->left ? ORB_OK : ORB_E_NO_MEMORY;
-  }
-  if (status == ORB_OK) {
-    label_edges(w, &c);
-  }
-  orb_free(ctx, c.queue);
-  orb_free(ctx, c.stack);
-  orb_free(ctx, c.arrival);
-  orb_free(ctx, c.sum);
-  return status;
 }
 
 static orb_status make_room(work *w, int32_t more) {
@@ -331,14 +194,58 @@ static orb_status search_seeds(work *w, int64_t count, int64_t most, double limi
   return ORB_OK;
 }
 
-static orb_status search_within(work *w, double limit) {
-  int64_t searches = w->seed_count;
-  if (!isfinite(limit)) {
-    int64_t most = WHOLE_VERTICES / w->p.s->mesh->vertex_count;
-    most = most < WHOLE_LEAST ? WHOLE_LEAST : most;
-    searches = searches < most ? searches : most;
+static orb_status search_whole(work *w) {
+  int64_t most = WHOLE_VERTICES / w->p.s->mesh->vertex_count;
+  most = most < WHOLE_LEAST ? WHOLE_LEAST : most;
+  return search_seeds(w, w->seed_count < most ? w->seed_count : most, INT64_MAX, INFINITY);
+}
+
+/* Takes so many settled vertices from what is allowed. */
+static orb_status pay(work *w, int64_t settled) {
+  if (w->allowed && (*w->allowed -= settled) < 0) {
+    return orb_fail(w->p.s->ctx, ORB_E_TOO_LARGE,
+                    "The search for the loops around the handles takes more work than a mesh of this size may cause. "
+                    "Close only smaller handles, with a lower handle_size, or decimate the mesh.");
   }
-  return search_seeds(w, searches, INT64_MAX, limit);
+  return orb_context_check(w->p.s->ctx);
+}
+
+/* The shortest cycle through a vertex is at most twice their distance longer than that through another one. So a long
+ * search tells about all seeds near it, which need no search. */
+static void pass_near(work *w, double distance) {
+  for (int32_t i = 0; i < w->p.touched_count; i++) {
+    int32_t v = w->p.touched[i];
+    w->passed[v] |= w->p.state[v] == ORB_DIJKSTRA_SETTLED && w->p.distance[v] <= distance;
+  }
+}
+
+/* Searches all seeds but those that others pass. After a long search the next one goes SLACK beyond the limit: if it
+ * finds nothing, the seeds around have no cycle within the limit. If it finds a cycle within the limit, theirs are at
+ * most SLACK shorter. */
+static orb_status search_within(work *w, double limit) {
+  double slack = 0;
+  ORB_TRY(pay(w, ROUND * (int64_t)w->p.s->mesh->triangle_count));
+  w->passed = ORB_NEW0(w->p.s->ctx, unsigned char, w->p.s->mesh->vertex_count);
+  if (!w->passed) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < w->seed_count; i++) {
+    if (w->passed[w->seed[i]]) {
+      continue;
+    }
+    double length = limit * (1 + slack);
+    int32_t closing = search(w, w->seed[i], INT64_MAX, &length);
+    const int within = closing >= 0 && length<limit, is_long = w->settled> LONG_SEARCH;
+    if (within) {
+      ORB_TRY(keep(w, closing));
+    }
+    if (is_long) {
+      pass_near(w, (within ? SLACK * length : length - limit) / 2);
+    }
+    slack = is_long ? SLACK : 0;
+    ORB_TRY(pay(w, w->settled));
+  }
+  return ORB_OK;
 }
 
 /* Searches the surroundings of each edge that is left, and of as many other seeds, so that cycles share no vertex. */
@@ -419,22 +326,21 @@ static orb_status choose(work *w, int32_t most, int independent, orb_cycles *out
 static orb_status open_work(work *w, orb_surface *s, orb_cycles *out) {
   *out = (orb_cycles){0};
   ORB_TRY(orb_dijkstra_open(&w->p, s));
-  w->in = ORB_NEW0(s->ctx, unsigned char, 3 * (size_t)s->mesh->triangle_count);
-  return w->in ? find_labels(w) : ORB_E_NO_MEMORY;
+  return orb_labels_find(&w->p, &w->left, &w->left_count);
 }
 
 static void close_work(work *w) {
   orb_context *ctx = w->p.s->ctx;
   orb_dijkstra_close(&w->p);
-  orb_free(ctx, w->in);
+  orb_free(ctx, w->passed);
   orb_free(ctx, w->seed);
   orb_free(ctx, w->left);
   orb_free(ctx, w->found);
   orb_free(ctx, w->pool);
 }
 
-orb_status orb_cycles_find(orb_surface *s, double limit, int32_t most, orb_cycles *out) {
-  work w = {0};
+orb_status orb_cycles_find(orb_surface *s, double limit, int32_t most, int64_t *allowed, orb_cycles *out) {
+  work w = {.allowed = allowed};
   orb_status status = open_work(&w, s, out);
   if (status == ORB_OK && !isfinite(limit)) {
     status = keep_generators(&w, INT32_MAX);
@@ -443,7 +349,7 @@ orb_status orb_cycles_find(orb_surface *s, double limit, int32_t most, orb_cycle
     status = list_seeds(&w);
   }
   if (status == ORB_OK) {
-    status = search_within(&w, limit);
+    status = isfinite(limit) ? search_within(&w, limit) : search_whole(&w);
   }
   if (status == ORB_OK) {
     status = choose(&w, most, most <= ORB_CYCLES_LABELLED, out);

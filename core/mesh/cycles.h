@@ -22,13 +22,17 @@ enum { ORB_CYCLES_LABELLED = 64 };
 
 /* Finds cycles of at most `limit`; INFINITY: of any length, and at least one on a surface with handles, unless it runs
  * over faces that repairs made. Only edges with a face of the file are used. The surface is closed, consistent and in
- * one piece, and its vertices have one fan each. The shortest cycle of the surface is among the result where its
- * length is below a finite limit. most: how many to return; above ORB_CYCLES_LABELLED, each leaves the surface
- * connected, and orb_cycles_apart() keeps those that do so together. The caller frees the result also on failure.
+ * one piece, and its vertices have one fan each. The shortest cycle of the surface, or one at most an eighth longer, is
+ * among the result where its length is below a finite limit. most: how many to return; above ORB_CYCLES_LABELLED, each
+ * leaves the surface connected, and orb_cycles_apart() keeps those that do so together. *allowed: how many vertices
+ * searches within a finite limit may settle; they take what they settle from it. NULL: any number. ORB_E_TOO_LARGE: it
+ * is used up. The caller frees the result also on failure.
  *
- * O(F log F), and for each vertex of O(√F · genus) seeds a search within limit / 2; with no limit, a few whole
- * searches. */
-ORB_MUST_CHECK orb_status orb_cycles_find(orb_surface *surface, double limit, int32_t most, orb_cycles *out);
+ * O(F log F), and a search within limit / 2 for each of O(√F · genus) seeds, but where such searches are long only for
+ * one in each sixteenth of the limit, which is near linear unless all loops are just longer than the limit. With no
+ * limit, a few whole searches. */
+ORB_MUST_CHECK orb_status orb_cycles_find(orb_surface *surface, double limit, int32_t most, int64_t *allowed,
+                                          orb_cycles *out);
 
 /* Finds as many cycles of any length as share no vertex, shortest first, among those of generators and of searches near
  * them. Each leaves the surface connected; orb_cycles_apart() keeps those that do so together. O(F log F + their total

@@ -14,7 +14,8 @@ void orb_loops_free(orb_context *ctx, orb_loops *loops);
 
 /* Cuts a closed surface of this genus, whose vertices have one fan each, along loops of up to `size` times the
  * diagonal, shortest first, and covers both rims of each cut, until it has no handles or none that small. Adds to the
- * mesh's handles; *genus: what is left. */
+ * mesh's handles; *genus: what is left. Searches settle 256 vertices for each triangle and a million more at most:
+ * ORB_E_TOO_LARGE. */
 ORB_MUST_CHECK orb_status orb_surface_close_handles(orb_surface *surface, double size, int64_t *genus);
 
 /* Finds a loop for each handle: closed, each vertex once, along edges of the file, and such that a cut along it leaves

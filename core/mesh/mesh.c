@@ -3,8 +3,9 @@
  * In: a mesh as a reader left it. Out: one that can be embedded, or an error with the facts. Reading order of the
  * folder: repair.c (the sequence of repairs and checks), surface (the mesh with its twins, pieces, fans and loops),
  * edges (twins), edit (changes that keep attributes), weld, fill and polygon (seams, holes, polygons),
- * parts (pieces by size and name), cycles and handles (handles: their loops, and how they are closed), refuse (the
- * errors). topology.c measures any index list, nearest.c finds nearest points, normals computes normals, sort.h sorts.
+ * parts (pieces by size and name), dijkstra, labels, cycles and handles (handles: their loops, and how they are
+ * closed), refuse (the errors). topology.c measures any index list, nearest.c finds nearest points, normals computes
+ * normals, sort.h sorts.
  */
 #include <string.h>
 

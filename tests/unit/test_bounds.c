@@ -18,6 +18,7 @@
 #include "base/hash.h"
 #include "orbmorph/format.h"
 #include "support_context.h"
+#include "support_handles.h"
 #include "support_zip.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -386,6 +387,57 @@ static void test_filled_hole(void **state) {
   fill_bowl(20000, 20000 - 2, 20000 - 2, 40);      /* flat */
 }
 
+/* A torus of n times n squares, and what its loops are: around the tube n edges, through the hole as many. */
+static text torus(int n) {
+  text t = {0};
+  char head[256];
+  add(&t, head,
+      (size_t)snprintf(head, sizeof head,
+                       "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
+                       "property float z\nelement face %d\nproperty list uchar int vertex_indices\nend_header\n",
+                       n * n, 2 * n * n));
+  for (int i = 0; i < n * n; i++) {
+    const double a = 2 * M_PI * (i / n) / n, b = 2 * M_PI * (i % n) / n;
+    const float p[3] = {(float)((3 + cos(b)) * cos(a)), (float)((3 + cos(b)) * sin(a)), (float)sin(b)};
+    add(&t, p, sizeof p);
+  }
+  for (int i = 0; i < n * n; i++) {
+    const int32_t r = i / n * n, s = (i / n + 1) % n * n, c = i % n, d = (i % n + 1) % n;
+    const int32_t corners[2][3] = {{r + c, s + c, s + d}, {r + c, s + d, r + d}};
+    for (int k = 0; k < 2; k++) {
+      add(&t, "\3", 1);
+      add(&t, corners[k], sizeof corners[k]);
+    }
+  }
+  return t;
+}
+
+/* Closes handles, and compares the time with what docs/limits.md says: each triangle costs what 3,000 bytes of an
+ * ordinary file cost, or less, however long the loops are. */
+static void close_handles(text file, orb_format format, double size, int handles) {
+  orb_mesh mesh;
+  const orb_repair_options options = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = size};
+  assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)file.at, file.size, format, &mesh, NULL), ORB_OK);
+  const int triangles = mesh.triangle_count;
+  const double begin = cpu_seconds();
+  assert_int_equal(orb_mesh_repair_with(ctx, &mesh, &options), ORB_OK);
+  const double seconds = cpu_seconds() - begin, usual = usual_seconds_a_byte();
+  print_message("%d handles of %d triangles: %.2f s, as %.0f bytes of an ordinary file a triangle\n", handles,
+                triangles, seconds, seconds / usual / triangles);
+  assert_int_equal(mesh.handle_count, handles);
+  assert_true(ORB_TEST_SANITIZED || seconds < 3000 * usual * triangles);
+  orb_mesh_free(ctx, &mesh);
+  free(file.at);
+}
+
+static void test_closed_handles(void **state) {
+  (void)state;
+  text plate = {0};
+  plate.at = handles_plate(3000, &plate.size);
+  close_handles(plate, ORB_FORMAT_OBJ, 1, 3000);
+  close_handles(torus(ORB_TEST_SANITIZED ? 60 : 300), ORB_FORMAT_PLY, 1, 1);
+}
+
 /* An object whose look-ups pass a million members. */
 static void test_many_members(void **state) {
   (void)state;
@@ -592,6 +644,7 @@ int main(void) {
       cmocka_unit_test(test_shared_indices),
       cmocka_unit_test(test_overlapping_accessors),
       cmocka_unit_test(test_filled_hole),
+      cmocka_unit_test(test_closed_handles),
       cmocka_unit_test(test_many_members),
       cmocka_unit_test(test_ordinary_memory),
       cmocka_unit_test(test_multiples),

@@ -11,6 +11,7 @@
 
 #include <cmocka.h>
 
+#include "mesh/cycles.h"
 #include "numeric/vec3.h"
 #include "orbmorph/format.h"
 #include "support_context.h"
@@ -512,6 +513,34 @@ static void test_mixed(void **state) {
   check_refused(&ring, &options, 1);
 }
 
+/* The length of the shortest cycle that a search with so much work finds. */
+static orb_status find_shortest(orb_mesh *mesh, double limit, int64_t allowed, double *length) {
+  orb_surface s = {0};
+  orb_cycles cycles = {0};
+  assert_int_equal(orb_surface_open(ctx, mesh, &s), ORB_OK);
+  const orb_status status = orb_cycles_find(&s, limit, ORB_CYCLES_LABELLED, &allowed, &cycles);
+  *length = status == ORB_OK && cycles.count > 0 ? cycles.cycle[0].length : INFINITY;
+  orb_cycles_free(ctx, &cycles);
+  orb_surface_close(&s);
+  return status;
+}
+
+/* The work of a search grows as the surface, not as its power of 1.5, and one that needs more is refused. */
+static void test_work(void **state) {
+  (void)state;
+  enum { N = 200, TRIANGLES = 2 * N * N };
+  const double around = 2 * N * sin(M_PI / N); /* the tube, everywhere */
+  double length;
+  orb_mesh ring = torus(N, 1);
+  assert_int_equal(find_shortest(&ring, 0.95 * around, 64 * TRIANGLES, &length), ORB_OK);
+  assert_true(length == INFINITY);
+  assert_int_equal(find_shortest(&ring, 10 * around, 64 * TRIANGLES, &length), ORB_OK);
+  assert_true(length > 0.999 * around && length < 1.125 * around);
+  assert_int_equal(find_shortest(&ring, 10 * around, 3 * TRIANGLES, &length), ORB_E_TOO_LARGE);
+  assert_non_null(strstr(orb_context_error(ctx)->detail, "handle_size"));
+  orb_mesh_free(ctx, &ring);
+}
+
 /* Whenever memory runs out, the call reports it and leaks nothing, which orb_context_destroy() checks. */
 static void test_memory(void **state) {
   (void)state;
@@ -520,7 +549,7 @@ static void test_memory(void **state) {
   for (double handle = 0.001; handle < 2; handle *= 1000) {
     int failures = 0;
     orb_status status = ORB_E_NO_MEMORY;
-    for (size_t limit = 4096; status == ORB_E_NO_MEMORY; limit += 512) {
+    for (size_t limit = 4096; status == ORB_E_NO_MEMORY; limit += 128) {
       const orb_context_options options = {.memory_limit = limit, .threads = 1};
       const orb_repair_options repair = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = handle};
       orb_context *own;
@@ -541,10 +570,10 @@ static void test_memory(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals),
-                                     cmocka_unit_test(test_refused), cmocka_unit_test(test_torus),
-                                     cmocka_unit_test(test_many),    cmocka_unit_test(test_many_closed),
-                                     cmocka_unit_test(test_mixed),   cmocka_unit_test(test_memory),
-                                     cmocka_unit_test(test_scans),   cmocka_unit_test(test_real_refused)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals),     cmocka_unit_test(test_refused),
+      cmocka_unit_test(test_torus),   cmocka_unit_test(test_many),        cmocka_unit_test(test_many_closed),
+      cmocka_unit_test(test_mixed),   cmocka_unit_test(test_work),        cmocka_unit_test(test_memory),
+      cmocka_unit_test(test_scans),   cmocka_unit_test(test_real_refused)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }
