@@ -10,7 +10,7 @@
 /* mesh: of an embedding, first: the first one of a supermesh. */
 #define NOTE(mesh, first)                                                                                     \
   "INSERT INTO crash(key, mesh, tenant, count, last) VALUES(?1, CASE WHEN json_valid(?2) THEN coalesce(" mesh \
-  ", " first ", '') ELSE ?1 END, ?3, 1, ?4) ON CONFLICT(key) DO UPDATE SET count=crash.count+1, last=?4, tenant=?3"
+  ", " first ", '') ELSE ?1 END, ?3, 1, ?4) ON CONFLICT(key, tenant) DO UPDATE SET count=crash.count+1, last=?4"
 
 int crash_note(database *db, const char *key, const char *request, const char *tenant, int64_t now) {
   sql_statement *st =
@@ -27,7 +27,8 @@ int crash_note(database *db, const char *key, const char *request, const char *t
 }
 
 static sql_statement *refused(database *db, const char *key) {
-  sql_statement *st = database_statement(db, "SELECT count(*) FROM crash WHERE key=?1 AND count>=?2");
+  sql_statement *st = database_statement(
+      db, "SELECT count(*) FROM (SELECT key FROM crash WHERE key=?1 GROUP BY key HAVING sum(count)>=?2) AS many");
   if (st) {
     sql_bind_text(st, 1, key);
     sql_bind_integer(st, 2, CRASHES_MOST);
@@ -97,11 +98,12 @@ int catalogue_crash_list(catalogue *cat, api_text *out) {
   database *db = catalogue_reader(cat);
   sql_statement *st = database_statement(db,
                                          "SELECT key, count, mesh, tenant, strftime('%Y-%m-%dT%H:%M:%SZ', last/1000,"
-                                         " 'unixepoch') FROM crash ORDER BY last DESC LIMIT 1000");
+                                         " 'unixepoch'), (SELECT sum(o.count) FROM crash o WHERE o.key=c.key)"
+                                         " FROM crash c ORDER BY last DESC, key, tenant LIMIT 1000");
   int code = st ? SQL_ROW : SQL_ERROR, count = 0;
   while (st && (code = sql_step(st)) == SQL_ROW) {
     api_text_printf(out, "%s crashes=%d%s mesh=%s tenant=%s last=%s\n", sql_text(st, 0), sql_int(st, 1),
-                    sql_int(st, 1) >= CRASHES_MOST ? " refused" : "", sql_text(st, 2), sql_text(st, 3),
+                    sql_int(st, 5) >= CRASHES_MOST ? " refused" : "", sql_text(st, 2), sql_text(st, 3),
                     sql_text(st, 4));
     count++;
   }

@@ -1,6 +1,6 @@
 /* Counts the crashes of processes that did only one piece of work. Each count belongs to the key of that work: the key
  * of a job, or the id of a checked mesh. The counts outlive the jobs, so the daemon finally refuses a file that crashes
- * its process each time. */
+ * its process each time. Each tenant has its own count, for its usage; the sum of all tenants is what is refused. */
 #ifndef ORB_STORE_CRASHES_H
 #define ORB_STORE_CRASHES_H
 
@@ -22,10 +22,10 @@ void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenan
 void catalogue_crash_of(catalogue *cat, const char *key, const char *result, const char *tenant, int64_t now);
 /* Whether the work of this key is refused. */
 int catalogue_crashed(catalogue *cat, const char *key);
-/* Forgets the crashes of all keys that begin with `name`, or of the tenant `name`, or of work on the mesh or result
- * `name`. STORE_NOT_FOUND: there are none. */
+/* Forgets the crashes of all keys that begin with `name`, or those of the tenant `name`, or of work on the mesh or
+ * result `name`. STORE_NOT_FOUND: there are none. */
 store_result catalogue_crash_clear(catalogue *cat, const char *name);
-/* Appends a line for each key, the latest first; −1: it cannot be read. */
+/* Appends a line for each key and tenant, the latest first; −1: it cannot be read. */
 int catalogue_crash_list(catalogue *cat, api_text *out);
 
 #endif

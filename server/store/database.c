@@ -150,6 +150,12 @@ static const char *const migrations[] = {
     "ALTER TABLE job ADD COLUMN trace TEXT NOT NULL DEFAULT '';",
     /* Places may be in the file of spheres (RESOURCE_PLACES_JOINED), which earlier programs do not know. */
     "SELECT 1;",
+    /* Each tenant has its own count of a key's deaths. Those so far stay with the tenant of the last one. */
+    "ALTER TABLE crash RENAME TO old_crash;"
+    "CREATE TABLE crash(key TEXT NOT NULL, mesh TEXT NOT NULL, tenant TEXT NOT NULL, count INTEGER NOT NULL,"
+    " last INTEGER NOT NULL, PRIMARY KEY(key, tenant)) WITHOUT ROWID;"
+    "INSERT INTO crash(key, mesh, tenant, count, last) SELECT key, mesh, tenant, count, last FROM old_crash;"
+    "DROP TABLE old_crash;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -35,7 +35,7 @@ static const table tables[] = {
     {"webhook", {"name"}, {0}, "", 0},
     {"token", {"hash"}, {0}, "", 0},
     {"signing_key", {"name"}, {0}, "", 0},
-    {"crash", {"key"}, {0}, "", 0},
+    {"crash", {"key", "tenant"}, {0}, "", 0},
     {"need", {"job", "key"}, {0}, "", 0}, /* of nodes that share a catalogue in PostgreSQL */
 };
 enum { TABLES = sizeof tables / sizeof tables[0] };

@@ -290,5 +290,7 @@ const char *const postgresql_migrations[] = {
     "  FROM json_array_elements(shapes) s, (VALUES('mesh'), ('name')) v(k) WHERE s->>k IS NOT NULL; END IF; END $$;",
     /* Places may be in the file of spheres (RESOURCE_PLACES_JOINED), which earlier programs do not know. */
     "DO $$ BEGIN END $$;",
+    /* Each tenant has its own count of a key's deaths. Those so far stay with the tenant of the last one. */
+    "ALTER TABLE crash DROP CONSTRAINT crash_pkey, ADD PRIMARY KEY(key, tenant);",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];

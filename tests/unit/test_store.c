@@ -14,6 +14,7 @@
 #include <cmocka.h>
 
 #include "store/catalogue.h"
+#include "store/crashes.h"
 #include "store/object_removal.h"
 #include "store/owners.h"
 #include "store/tokens.h"
@@ -196,6 +197,44 @@ static void test_attempts(void **state) {
   assert_int_equal(events[0].number, 6);
   assert_string_equal(events[0].type, "succeeded");
   free(events[0].json);
+}
+
+static int64_t crashes_of(stored *s, const char *tenant) {
+  usage_row row = {0};
+  assert_int_equal(catalogue_usage(s->cat, tenant, tenant, 0, 1, &row), 1);
+  return row.crashes;
+}
+
+/* Notes a crash, and waits for the write behind it. */
+static void crash(stored *s, const char *key, const char *tenant, int64_t now) {
+  catalogue_crash_of_mesh(s->cat, key, tenant, now);
+  assert_int_equal(catalogue_crash_clear(s->cat, "none"), STORE_NOT_FOUND);
+}
+
+/* The deaths of one key count for the tenant of each, and together they refuse the key. */
+static void test_crashes_of_tenants(void **state) {
+  stored *s = *state;
+  char key[API_ID_SIZE];
+  api_text list = {0};
+  make_id(key, 'c');
+  crash(s, key, "ann", 1);
+  crash(s, key, "bob", 2);
+  assert_int_equal(catalogue_crashed(s->cat, key), 0);
+  crash(s, key, "ann", 3);
+  assert_int_equal(catalogue_crashed(s->cat, key), 1);
+  assert_int_equal(crashes_of(s, "ann"), 2);
+  assert_int_equal(crashes_of(s, "bob"), 1);
+  assert_int_equal(crashes_of(s, "eve"), 0);
+  assert_int_equal(catalogue_crash_list(s->cat, &list), 2);
+  assert_non_null(strstr(list.data, "crashes=2 refused"));
+  assert_non_null(strstr(list.data, "crashes=1 refused"));
+  api_text_free(&list);
+  assert_int_equal(catalogue_crash_clear(s->cat, "ann"), STORE_OK);
+  assert_int_equal(catalogue_crashed(s->cat, key), 0);
+  assert_int_equal(crashes_of(s, "ann"), 0);
+  assert_int_equal(crashes_of(s, "bob"), 1);
+  assert_int_equal(catalogue_crash_clear(s->cat, "ccc"), STORE_OK);
+  assert_int_equal(crashes_of(s, "bob"), 0);
 }
 
 /* After a crash, the jobs that ran are queued again as suspects. A job that ran alone in three crashes fails, with a
@@ -524,6 +563,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_temporaries, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_resources, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_attempts, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_crashes_of_tenants, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_recovery, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_derived_bytes, stored_setup, stored_teardown),
