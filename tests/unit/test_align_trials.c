@@ -124,6 +124,46 @@ static void assert_limbs(const orb_trials *t) {
   }
 }
 
+/* Landmarks at the tips of two limbs, each of which goes to the place of the other one. */
+static void give_wrong_landmarks(orb_trials *t) {
+  enum { GIVEN = 2 };
+  double *at[2];
+  for (int s = 0; s < 2; s++) {
+    at[s] = orb_alloc(ctx, 3 * GIVEN, sizeof(double));
+    assert_non_null(at[s]);
+    for (int i = 0; i < GIVEN; i++) {
+      const orb_mesh *mesh = &t->copy[s].mesh;
+      const int32_t tip = shape_farthest(mesh, limb[s == 0 ? i : 1 - i]);
+      memcpy(at[s] + 3 * (size_t)i, mesh->positions + 3 * (size_t)tip, 3 * sizeof(double));
+    }
+  }
+  assert_int_equal(orb_hint_places_create(ctx, GIVEN, GIVEN, GIVEN, at, t->copy, &t->hint), ORB_OK);
+}
+
+/* A trial that takes landmarks elsewhere both ways is dropped, and not raised: coarse copies then get trials of their
+ * own. */
+static void wrong_trials_are_dropped(void **state) {
+  (void)state;
+  scene s;
+  int32_t list[ORB_TRIALS_MAX];
+  scene_open(&s, alike);
+  assert_int_equal(orb_trials_make(&s.small), ORB_OK);
+  assert_int_equal(orb_trials_rank(&s.small), ORB_OK);
+  const int32_t best = orb_trials_best(&s.small);
+  assert_limbs(&s.small);
+  give_wrong_landmarks(&s.small);
+  assert_false(orb_trial_keeps_hint(&s.small, &s.small.trial[best], 0));
+  orb_trial_fill_cost(&s.small, &s.small.trial[best], 1); /* one way says too little */
+  assert_true(s.small.trial[best].cost < INFINITY);
+  orb_trial_fill_cost(&s.small, &s.small.trial[best], 2);
+  assert_false(s.small.trial[best].cost < INFINITY);
+  const int32_t count = orb_trials_differing(&s.small, 0, ORB_TRIALS_MAX, list);
+  for (int32_t i = 0; i < count; i++) {
+    assert_int_not_equal(list[i], best);
+  }
+  scene_close(&s);
+}
+
 /* From small copies to coarse ones: crossing bends no trial more, and the best trial keeps every limb. */
 static void best_trial_keeps_limbs(void **state) {
   (void)state;
@@ -260,8 +300,9 @@ static void landmarks_are_tried(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_end_in_tips), cmocka_unit_test(tips_meet_their_partners),
-                                     cmocka_unit_test(best_trial_keeps_limbs), cmocka_unit_test(landmarks_make_a_trial),
-                                     cmocka_unit_test(landmarks_are_tried)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(limbs_end_in_tips),        cmocka_unit_test(tips_meet_their_partners),
+      cmocka_unit_test(wrong_trials_are_dropped), cmocka_unit_test(best_trial_keeps_limbs),
+      cmocka_unit_test(landmarks_make_a_trial),   cmocka_unit_test(landmarks_are_tried)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -117,7 +117,8 @@ static double lead_of_second(const contest *c) {
 static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *out) {
   const int32_t first = c->count == 2 && c->round[1] < c->round[0], second = c->count - 1 - first;
   int32_t winner = c->round[first];
-  if (c->energy[c->round[second]] - 1 < ORB_FIND_CONTEST_GAIN * (c->energy[winner] - 1)) {
+  const double gain = c->round[second] == SECOND ? ORB_FIND_CONTEST_GAIN : 1;
+  if (c->energy[c->round[second]] - 1 < gain * (c->energy[winner] - 1)) {
     winner = c->round[second];
   }
   out->is_second = winner == SECOND;

@@ -18,6 +18,8 @@ typedef struct orb_match_hint {
 /* The hint on scaled coarse copies of the shapes. */
 typedef struct orb_hint_places {
   int32_t count, few, trusted;
+  int tells; /* 1: their distances tell whether the shapes are one body. Otherwise they only exclude and draw maps. The
+                caller's to set */
   int32_t *vertex[2]; /* the nearest vertex of the copy */
   double *at[2];      /* the landmark, in the copy's space */
 } orb_hint_places;

@@ -156,7 +156,7 @@ static double roundness(const orb_mesh *copy) {
   return fabs(volume) / (4 * M_PI / 3);
 }
 
-/* Places the landmarks on the copies. *stretch: see orb_hint_stretch(). */
+/* Places the landmarks on the copies. *stretch: see orb_hint_stretch(); 0 if they do not tell. */
 static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *stretch) {
   double *at[2];
   int32_t count = 0, few = 0, trusted = 0;
@@ -178,7 +178,10 @@ static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *s
     trusted += i < hint->trusted;
   }
   ORB_TRY(orb_hint_places_create(t->ctx, count, few, trusted, at, t->copy, &t->hint));
-  return orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch);
+  ORB_TRY(orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch));
+  t->hint.tells = count >= ORB_FIND_HINT_LEAST && *stretch < INFINITY;
+  *stretch = t->hint.tells ? *stretch : 0;
+  return ORB_OK;
 }
 
 /* Are the shapes as much alike under a trial as the hint demands? */
@@ -186,12 +189,15 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
   return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
 }
 
-/* Improves trials that bend small copies much, unless landmarks say which limb is which: those of one body do, and so
- * do many of unlike shapes. Of 83 pairs of animals of other kinds (seed 31), with 8 and with 24 landmarks improved
- * trials led to as much error. */
+/* Do landmarks leave open which limb is which? Those of one body do not, and neither do many of unlike shapes: of 83
+ * pairs of animals of other kinds (seed 31), with 8 and with 24 landmarks improved trials led to as much error. */
+static int leaves_limbs_open(const orb_hint_places *hint, int are_unlike) {
+  return !hint->tells || (are_unlike && hint->count < ORB_FIND_HINT_FEW);
+}
+
+/* Improves trials that bend small copies much, unless landmarks say which limb is which. */
 static orb_status improve_trials(orb_trials *small, int are_unlike) {
-  const int count = small->hint.count, are_few = are_unlike && count < ORB_FIND_HINT_FEW;
-  if ((count > 0 && !are_few) || !orb_trials_bend_much(small)) {
+  if (!leaves_limbs_open(&small->hint, are_unlike) || !orb_trials_bend_much(small)) {
     return ORB_OK;
   }
   ORB_TRY(orb_trials_find_symmetries(small));
@@ -220,7 +226,7 @@ static orb_status fill_trials(orb_trials *t, int are_unlike) {
     ORB_GO(status, orb_trials_make(t), end);
   }
   ORB_GO(status, orb_trials_rank(t), end);
-  if (t->hint.count == 0) {
+  if (!t->hint.tells) {
     ORB_GO(status, orb_trials_cross(t), end);
     status = orb_trials_weigh_asymmetry(small, t);
   }
@@ -238,9 +244,9 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   if (hint) {
     ORB_TRY(take_hint(t, hint, &stretch));
   }
-  out->is_unlike = stretch > ORB_FIND_HINT_STRETCH_MOST && stretch < INFINITY;
+  out->is_unlike = stretch > ORB_FIND_HINT_STRETCH_MOST;
   out->walks_above = t->walks_above = out->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
-  if (hint && !(stretch <= hint->stretch && stretch < INFINITY)) {
+  if (hint && stretch > hint->stretch) {
     return ORB_OK;
   }
   double bend = INFINITY;

@@ -66,7 +66,9 @@ static orb_status copy_hint(const orb_trials *coarse, orb_trials *small) {
       memcpy(at[s], from->at[s], count * sizeof(double));
     }
   }
-  return orb_hint_places_create(small->ctx, from->count, from->few, from->trusted, at, small->copy, &small->hint);
+  ORB_TRY(orb_hint_places_create(small->ctx, from->count, from->few, from->trusted, at, small->copy, &small->hint));
+  small->hint.tells = from->tells;
+  return ORB_OK;
 }
 
 orb_status orb_trials_open_small(const orb_trials *coarse, orb_trials *small) {
@@ -322,18 +324,23 @@ void orb_trial_images(const orb_trials *t, const orb_trial *one, int s, int32_t 
   orb_survey_images(&t->survey[1 - s], &t->copy[1 - s].mesh, one->pose[s].position, t->copy[s].mesh.vertex_count, out);
 }
 
+/* The mean distance of landmarks from their partners up to which a map keeps them. */
+static double most_off(const orb_trials *t) {
+  return t->hint.tells ? ORB_FIND_HINT_OFF : ORB_FIND_HINT_OFF_FEW;
+}
+
 int orb_trial_keeps_hint(const orb_trials *t, const orb_trial *one, int s) {
-  return orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) <= ORB_FIND_HINT_OFF;
+  return orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) <= most_off(t);
 }
 
 void orb_trial_fill_cost(const orb_trials *t, orb_trial *one, int directions) {
   const double factor =
       (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0)) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
   const double bend = directions == 2 ? (one->bend[0] + one->bend[1]) / 2 : one->bend[0];
-  const int is_known = isfinite(one->bend[0] * factor) && isfinite(bend * factor);
   const int is_kept = directions == 1 || orb_trial_keeps_hint(t, one, 0) || orb_trial_keeps_hint(t, one, 1);
+  const int is_known = is_kept && isfinite(one->bend[0] * factor) && isfinite(bend * factor);
   one->rough = is_known ? one->bend[0] * factor : INFINITY;
-  one->cost = is_known && is_kept ? bend * factor : INFINITY;
+  one->cost = is_known ? bend * factor : INFINITY;
 }
 
 /* Dropped trials come last, by their rough cost. */
@@ -405,7 +412,7 @@ static void drop_far_from_hint(orb_trials *t) {
     least = fmin(least, off[i]);
   }
   for (int32_t i = 0; i < t->count; i++) {
-    if (off[i] > fmax(ORB_FIND_HINT_OFF, ORB_FIND_HINT_ROUGH * least)) {
+    if (off[i] > fmax(most_off(t), ORB_FIND_HINT_ROUGH * least)) {
       t->trial[i].cost = t->trial[i].rough = INFINITY;
     }
   }

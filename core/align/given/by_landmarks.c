@@ -335,7 +335,7 @@ static void keep_better(two_ways *c) {
  * less error, and 4 more than 5 % more. */
 static orb_status try_pose_again(two_ways *c) {
   const double poor = orb_map_params_of(c->options->preset).energy.poor;
-  if (c->posed.is_found || c->landmark_count < ORB_FIND_HINT_LEAST || c->loose <= poor) {
+  if (c->posed.is_found || c->loose <= poor) {
     return ORB_OK;
   }
   if (c->posed.is_unsure) {
@@ -385,9 +385,7 @@ static int is_enough(const two_ways *c) {
 }
 
 static orb_status hold(two_ways *c) {
-  if (c->landmark_count >= ORB_FIND_HINT_LEAST) {
-    ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH));
-  }
+  ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH));
   if (is_enough(c)) {
     return ORB_OK;
   }
@@ -395,10 +393,10 @@ static orb_status hold(two_ways *c) {
   return c->lacks_room ? ORB_OK : improve(c);
 }
 
-/* If the landmarks show one body in two poses, a match comes first: it knows the surface between the landmarks, and if
- * its map has little energy, nothing is pinned. For 35 pairs of animals of one kind, landmark walks with 8 true
- * landmarks have up to three times the error of matches without any. If the match's map is less good and the pins
- * cannot meet, it is kept: it takes each landmark to its partner too. */
+/* A match comes first, unless the landmarks show that the shapes are not one body in two poses. It knows the surface
+ * between the landmarks, and if its map has little energy, nothing is pinned. For 35 pairs of animals of one kind,
+ * landmark walks with 8 true landmarks have up to three times the error of matches without any. If the match's map is
+ * less good and the pins cannot meet, it is kept: it takes each landmark to its partner too. */
 orb_status orb_align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                   const orb_landmark *landmarks, int32_t landmark_count,
                                   const orb_align_options *options, orb_alignment *out) {
