@@ -35,8 +35,10 @@ static int convert_within(objects *store, const task_head *task, int asset, orb_
   return stored == STORE_OK ? fine : task_refuse_store(stored, problem);
 }
 
-/* Takes the object and the end: 1, 0 with the problem, −1: the process died, was stopped, or sent something else. */
-static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out, api_problem *problem) {
+/* Takes the object and the end: 1, 0 with the problem, −1: the process died, was stopped, or sent something else
+ * (*breach). */
+static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out, const char **breach,
+                api_problem *problem) {
   frame f;
   done_head done;
   char *json = NULL;
@@ -48,28 +50,35 @@ static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out,
     store_result stored = fits ? objects_copy(store, ctx, f.fd, head.start, head.size, out) : STORE_OK;
     bytes = head.size;
     frame_free(&f);
+    *breach = fits ? NULL : "an object without its size or its file";
     if (!fits || stored != STORE_OK) {
       return fits && orb_context_check(ctx) == ORB_OK ? task_refuse_store(stored, problem) : -1;
     }
     got = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
   }
   if (got != CHANNEL_OK) {
+    *breach = got == CHANNEL_BAD ? ISOLATE_NO_FRAME : NULL;
     return -1;
   }
   int fine = f.type == FRAME_DONE && task_read_done(&f, &done, &json, problem);
   frame_free(&f);
   free(json);
-  return !fine ? -1 : !done.fine ? 0 : bytes > 0 && done.bytes == bytes ? 1 : -1;
+  if (fine && !done.fine) {
+    return 0;
+  }
+  *breach = fine && bytes > 0 && done.bytes == bytes ? NULL : "an end that does not fit the conversion";
+  return *breach ? -1 : 1;
 }
 
-/* The process died. SIGKILL counts: the service kills only for the context, which the caller has asked, so memory was
- * short. An unknown end does not: all processes end so with the one that forks them. */
-static int refuse_dead(catalogue *cat, const char *id, const char *tenant, const task_head *task, int status,
-                       api_problem *problem) {
+/* The process died, or was ended for a breach. SIGKILL counts: the service kills only for a breach and for the context,
+ * which the caller has asked, so otherwise memory was short. An unknown end without a breach does not: all processes
+ * end so with the one that forks them. */
+static int refuse_dead(catalogue *cat, const char *id, const char *tenant, const task_head *task, const char *breach,
+                       int status, api_problem *problem) {
   char why[100];
-  isolate_status_text(status, why, sizeof why);
+  isolate_end_text(breach, status, why, sizeof why);
   log_error("the process that converted the asset of supermesh %s %s", id, why);
-  if (status != -1) {
+  if (breach || status != -1) {
     catalogue_crash_of(cat, task->key, id, tenant, (int64_t)time(NULL) * 1000);
   }
   return api_refuse(problem, "job-crashed",
@@ -80,14 +89,16 @@ static int convert_isolated(catalogue *cat, objects *store, orb_context *ctx, co
                             int asset, const char *tenant, const convert_limits *limits, object_temp *out,
                             api_problem *problem) {
   isolated process;
+  const char *breach = NULL;
   const struct iovec part = {(void *)(uintptr_t)task, sizeof *task};
   if (!isolate_open(&process, ctx)) {
     return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
   }
   process.wanted = limits->wanted;
   process.user = limits->user;
-  int result =
-      isolate_send(&process, FRAME_TASK, &part, 1, asset) == CHANNEL_OK ? take(&process, store, ctx, out, problem) : -1;
+  int result = isolate_send(&process, FRAME_TASK, &part, 1, asset) == CHANNEL_OK
+                   ? take(&process, store, ctx, out, &breach, problem)
+                   : -1;
   int status = isolate_close(&process);
   if (result >= 0) {
     return result;
@@ -96,7 +107,7 @@ static int convert_isolated(catalogue *cat, objects *store, orb_context *ctx, co
     api_problem_of_error(orb_context_error(ctx), problem);
     return 0;
   }
-  return refuse_dead(cat, id, tenant, task, status, problem);
+  return refuse_dead(cat, id, tenant, task, breach, status, problem);
 }
 
 int convert_asset(catalogue *cat, objects *store, orb_context *ctx, const char *id, orb_profile profile, int asset,

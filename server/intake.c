@@ -122,20 +122,33 @@ typedef struct given_file {
   int fd;
 } given_file;
 
-/* 1 with the description, 0 with the problem, −1: the process died or was stopped. */
-static int ask(isolated *process, const task_head *task, given_file file, api_text *json, api_problem *problem) {
+/* How a process ended that gave no answer. */
+typedef struct check_end {
+  int status;         /* as of isolate_close() */
+  const char *breach; /* NULL: it died or was stopped */
+} check_end;
+
+/* 1 with the description, 0 with the problem, −1: the process died or was stopped, or broke the protocol. */
+static int ask(isolated *process, const task_head *task, given_file file, api_text *json, const char **breach,
+               api_problem *problem) {
   const struct iovec parts[2] = {{(void *)(uintptr_t)task, sizeof *task},
                                  {(void *)(uintptr_t)file.sent, file.sent ? (size_t)task->bytes : 0}};
   frame f;
   done_head done;
   char *text = NULL;
-  if (isolate_send(process, FRAME_TASK, parts, 2, file.fd) != CHANNEL_OK ||
-      isolate_receive(process, CHANNEL_ANSWER_MOST, &f) != CHANNEL_OK) {
+  *breach = NULL;
+  if (isolate_send(process, FRAME_TASK, parts, 2, file.fd) != CHANNEL_OK) {
+    return -1;
+  }
+  const channel_result got = isolate_receive(process, CHANNEL_ANSWER_MOST, &f);
+  if (got != CHANNEL_OK) {
+    *breach = got == CHANNEL_BAD ? ISOLATE_NO_FRAME : NULL;
     return -1;
   }
   int fine =
       f.type == FRAME_DONE && task_read_done(&f, &done, &text, problem) && (!done.fine || (text && is_of(task, text)));
   frame_free(&f);
+  *breach = fine ? NULL : "an answer that does not fit the check";
   if (fine && done.fine) {
     api_text_add(json, text);
     fine = !json->failed;
@@ -145,9 +158,9 @@ static int ask(isolated *process, const task_head *task, given_file file, api_te
 }
 
 /* As ask(), in a process that may have read other files of the tenant (*others), or, without a tenant, in one of its
- * own. status: how it ended, if the result is −1. */
+ * own. end: filled if the result is −1. */
 static int ask_one(const task_head *task, given_file file, const char *tenant, orb_context *ctx,
-                   const intake_limits *limits, api_text *json, api_problem *problem, int *others, int *status) {
+                   const intake_limits *limits, api_text *json, api_problem *problem, int *others, check_end *end) {
   isolated own, *process = &own;
   task_head head = *task;
   reader *r = tenant ? reader_take(tenant, limits->part, task->bytes, task->memory, ctx) : NULL;
@@ -163,11 +176,11 @@ static int ask_one(const task_head *task, given_file file, const char *tenant, o
   }
   process->wanted = limits->wanted;
   process->user = limits->user;
-  int result = ask(process, &head, file, json, problem);
+  int result = ask(process, &head, file, json, &end->breach, problem);
   if (r && result >= 0) {
     reader_give(r);
   } else {
-    *status = r ? reader_end(r) : isolate_close(&own);
+    end->status = r ? reader_end(r) : isolate_close(&own);
   }
   return result;
 }
@@ -187,17 +200,18 @@ static int give_file(const intake_file *file, given_file *out) {
 static int check_isolated(const intake_file *file, const task_head *task, const char *tenant, orb_context *ctx,
                           const intake_limits *limits, api_text *json, api_problem *problem, int *died) {
   char why[100];
-  int others, status = -1;
+  int others;
+  check_end end = {.status = -1};
   given_file given;
   if (!give_file(file, &given)) {
     return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
   }
-  int result = ask_one(task, given, tenant, ctx, limits, json, problem, &others, &status);
+  int result = ask_one(task, given, tenant, ctx, limits, json, problem, &others, &end);
   if (result < 0 && others && orb_context_check(ctx) == ORB_OK) {
-    isolate_status_text(status, why, sizeof why);
+    isolate_end_text(end.breach, end.status, why, sizeof why);
     log_warn("a process that checked several meshes, the last of them %s, %s; this one is checked again", file->id,
              why);
-    result = ask_one(task, given, NULL, ctx, limits, json, problem, &others, &status);
+    result = ask_one(task, given, NULL, ctx, limits, json, problem, &others, &end);
   }
   if (given.fd >= 0) {
     close(given.fd);
@@ -209,10 +223,11 @@ static int check_isolated(const intake_file *file, const task_head *task, const 
     api_problem_of_error(orb_context_error(ctx), problem);
     return 0;
   }
-  isolate_status_text(status, why, sizeof why);
-  /* SIGKILL counts: the service kills only for the context, seen above, so memory was short, and a file may need that
-   * much each time. An unknown end does not: all processes end so with the one that forks them. */
-  *died = status != -1;
+  isolate_end_text(end.breach, end.status, why, sizeof why);
+  /* SIGKILL counts: the service kills only for a breach, which is the file's fault, and for the context, seen above. So
+   * otherwise memory was short, and a file may need that much each time. An unknown end without a breach does not: all
+   * processes end so with the one that forks them. */
+  *died = end.breach || end.status != -1;
   log_error("the process that checked mesh %s %s", file->id, why);
   return api_refuse(problem, "job-crashed",
                     "The process that read the file died. Please report this as a bug, with the file.");

@@ -129,9 +129,12 @@ channel_result channel_receive(int fd, size_t most, frame *out, channel_continue
   head begin;
   *out = (frame){.fd = -1};
   channel_result result = receive_all(fd, &begin, sizeof begin, &out->fd, continues, user);
-  if (result == CHANNEL_OK && (begin.version != CHANNEL_VERSION || begin.type == 0 || begin.type >= FRAME_TYPES ||
-                               begin.size > most || !(out->bytes = malloc(begin.size + 1)))) {
+  if (result == CHANNEL_OK &&
+      (begin.version != CHANNEL_VERSION || begin.type == 0 || begin.type >= FRAME_TYPES || begin.size > most)) {
     result = CHANNEL_BAD;
+  }
+  if (result == CHANNEL_OK && !(out->bytes = malloc(begin.size + 1))) {
+    result = CHANNEL_CLOSED;
   }
   if (result == CHANNEL_OK) {
     out->type = (frame_type)begin.type;

@@ -38,6 +38,7 @@ typedef struct frame {
 enum { CHANNEL_LOOK_MS = 20 };
 typedef int (*channel_continues)(void *user);
 
+/* Closed: also if this end has no memory for the frame. Bad: what arrived is no frame, or a larger one than allowed. */
 typedef enum channel_result { CHANNEL_OK, CHANNEL_CLOSED, CHANNEL_STOPPED, CHANNEL_BAD } channel_result;
 
 /* Sends the parts as one payload, and a copy of the descriptor unless it is −1. */

@@ -44,8 +44,13 @@ channel_result isolate_receive(isolated *p, size_t most, frame *out);
 /* Kills the process unless it has ended, and logs what it wrote to standard error. Returns its status as of waitpid();
  * −1: unknown. */
 int isolate_close(isolated *p);
-/* Describes a status that is not 0: "was killed by signal 11 (Segmentation fault)". */
-void isolate_status_text(int status, char *out, size_t room);
+/* Describes an end without an answer. breach: what the process sent against the protocol, for which the daemon ended it
+ * ("broke the protocol: too many reports"); NULL: describes its status, which is not 0 ("was killed by signal 11
+ * (Segmentation fault)"). */
+void isolate_end_text(const char *breach, int status, char *out, size_t room);
+
+/* A breach: CHANNEL_BAD. */
+#define ISOLATE_NO_FRAME "bytes that are no frame, or too large a one"
 
 /* The zygote's side: never returns. work: runs in each forked process, with its channel. */
 enum { ISOLATE_FD = 3 };

@@ -472,8 +472,10 @@ int isolate_close(isolated *p) {
   return status;
 }
 
-void isolate_status_text(int status, char *out, size_t room) {
-  if (status != -1 && WIFSIGNALED(status)) {
+void isolate_end_text(const char *breach, int status, char *out, size_t room) {
+  if (breach) {
+    snprintf(out, room, "broke the protocol: %s", breach);
+  } else if (status != -1 && WIFSIGNALED(status)) {
     snprintf(out, room, "was killed by signal %d (%s)", WTERMSIG(status), strsignal(WTERMSIG(status)));
   } else if (status != -1 && WIFEXITED(status)) {
     snprintf(out, room, "exited with status %d", WEXITSTATUS(status));

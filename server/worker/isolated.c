@@ -135,73 +135,6 @@ static void take_alignment(const run_env *env, orb_context *ctx, const char *id,
   objects_abandon(&temp);
 }
 
-typedef int64_t made_bytes[OBJECT_KINDS]; /* of each object that the process has made */
-
-/* Stores an object that the process has made: 1, 0 with the problem, −1: it may not make that. */
-static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j, const char *alignment,
-                       const frame *f, made_bytes bytes, run_output *out, api_problem *problem) {
-  object_head head;
-  if (!task_read_object(f, &head)) {
-    return -1;
-  }
-  if (head.kind == OBJECT_ALIGNMENT && kind == API_JOB_SUPERMESH) {
-    if (!alignment[0] || memcmp(head.id, alignment, sizeof head.id) != 0 || out->holds) {
-      return -1;
-    }
-    take_alignment(env, ctx, alignment, &head, f->fd);
-    return 1;
-  }
-  if (!may_make(kind, head.kind) || memcmp(head.id, j->key, sizeof head.id) != 0) {
-    return -1;
-  }
-  if (!out->holds) {
-    objects_hold(env->store);
-    out->holds = 1;
-  }
-  object_temp temp = {.fd = -1};
-  store_result stored = objects_copy(env->store, ctx, f->fd, head.start, head.size, &temp);
-  bytes[head.kind] = head.size;
-  stored = stored == STORE_OK ? objects_publish(env->store, &temp, head.kind, head.id) : stored;
-  objects_abandon(&temp);
-  if (stored != STORE_OK && orb_context_check(ctx) == ORB_OK) {
-    task_refuse_store(stored, problem);
-  }
-  return stored == STORE_OK;
-}
-
-/* Whether a result has a description, and as many bytes as its objects, by which quotas count it. */
-static int is_result(const done_head *done, const char *json, const made_bytes bytes) {
-  cJSON *description = json ? task_json(json) : NULL;
-  const int is_json = description != NULL;
-  int64_t sum = 0;
-  for (int kind = 0; kind < OBJECT_KINDS; kind++) {
-    sum += bytes[kind];
-  }
-  cJSON_Delete(description);
-  return is_json && done->bytes == sum;
-}
-
-static int take_done(const run_job *j, api_job_kind kind, const frame *f, const made_bytes bytes, run_output *out,
-                     api_problem *problem) {
-  done_head done;
-  char *json;
-  if (!task_read_done(f, &done, &json, problem) || (done.fine && !is_result(&done, json, bytes))) {
-    free(json);
-    api_problem_free(problem);
-    return -1;
-  }
-  out->gone = done.gone;
-  out->flips = done.flips;
-  out->row.kind = kind == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
-  out->row.bytes = done.bytes;
-  out->row.created = done.created;
-  out->row.json = json;
-  memcpy(out->row.id, j->key, sizeof out->row.id);
-  memcpy(out->row.sha, done.sha, sizeof done.sha);
-  memcpy(out->row.places, done.places, sizeof done.places);
-  return done.fine;
-}
-
 /* What a process may report: each report costs the daemon's time, and each new stage a write to the catalogue.
  * REPORTS_MOST: in a second. A process sends 50, as confined.c limits it, and its socket holds at most some 300 more,
  * which arrive at once if the daemon is late. STAGES_MOST: of a job. A supermesh has 6; an embedding has 6, and more if
@@ -215,6 +148,90 @@ typedef struct reports {
   char stage[sizeof((progress_head *)0)->stage];
 } reports;
 
+/* The answers of a process to its job. */
+typedef struct answers {
+  const run_env *env;
+  orb_context *ctx;
+  api_job_kind kind;
+  const run_job *job;
+  const char *alignment;       /* as in collected */
+  int64_t hold_ms;             /* as in isolated_limits */
+  int objects;                 /* that have come */
+  int64_t bytes[OBJECT_KINDS]; /* of each object that the process has made */
+  reports so_far;
+  channel_result got; /* the last result of the channel */
+  const char *breach; /* what the process did against the protocol; NULL: nothing */
+} answers;
+
+static int breach(answers *a, const char *what) {
+  a->breach = what;
+  return -1;
+}
+
+/* Stores an object that the process has made: 1, 0 with the problem, −1: it may not make that. */
+static int take_object(answers *a, const frame *f, run_output *out, api_problem *problem) {
+  const run_env *env = a->env;
+  object_head head;
+  if (!task_read_object(f, &head) || ++a->objects > OBJECTS_MOST) {
+    return breach(a, "too many objects, or one without its size or its file");
+  }
+  if (head.kind == OBJECT_ALIGNMENT && a->kind == API_JOB_SUPERMESH) {
+    if (!a->alignment[0] || memcmp(head.id, a->alignment, sizeof head.id) != 0 || out->holds) {
+      return breach(a, "another alignment than that of the job");
+    }
+    take_alignment(env, a->ctx, a->alignment, &head, f->fd);
+    return 1;
+  }
+  if (!may_make(a->kind, head.kind) || memcmp(head.id, a->job->key, sizeof head.id) != 0) {
+    return breach(a, "an object that the job does not make");
+  }
+  if (!out->holds) {
+    objects_hold(env->store);
+    out->holds = 1;
+  }
+  object_temp temp = {.fd = -1};
+  store_result stored = objects_copy(env->store, a->ctx, f->fd, head.start, head.size, &temp);
+  a->bytes[head.kind] = head.size;
+  stored = stored == STORE_OK ? objects_publish(env->store, &temp, head.kind, head.id) : stored;
+  objects_abandon(&temp);
+  if (stored != STORE_OK && orb_context_check(a->ctx) == ORB_OK) {
+    task_refuse_store(stored, problem);
+  }
+  return stored == STORE_OK;
+}
+
+/* Whether a result has a description, and as many bytes as its objects, by which quotas count it. */
+static int is_result(const done_head *done, const char *json, const int64_t bytes[OBJECT_KINDS]) {
+  cJSON *description = json ? task_json(json) : NULL;
+  const int is_json = description != NULL;
+  int64_t sum = 0;
+  for (int kind = 0; kind < OBJECT_KINDS; kind++) {
+    sum += bytes[kind];
+  }
+  cJSON_Delete(description);
+  return is_json && done->bytes == sum;
+}
+
+static int take_done(answers *a, const frame *f, run_output *out, api_problem *problem) {
+  done_head done;
+  char *json;
+  if (!task_read_done(f, &done, &json, problem) || (done.fine && !is_result(&done, json, a->bytes))) {
+    free(json);
+    api_problem_free(problem);
+    return breach(a, "an end that is neither a result nor a problem");
+  }
+  out->gone = done.gone;
+  out->flips = done.flips;
+  out->row.kind = a->kind == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
+  out->row.bytes = done.bytes;
+  out->row.created = done.created;
+  out->row.json = json;
+  memcpy(out->row.id, a->job->key, sizeof out->row.id);
+  memcpy(out->row.sha, done.sha, sizeof done.sha);
+  memcpy(out->row.places, done.places, sizeof done.places);
+  return done.fine;
+}
+
 /* Whether a text is the name of a stage, as core and the jobs write them. */
 static int is_stage(const char *text) {
   const size_t letters = strspn(text, "abcdefghijklmnopqrstuvwxyz");
@@ -223,15 +240,19 @@ static int is_stage(const char *text) {
 
 /* Shows a report of progress, but not once results arrive (holds): then stages no longer change. 1, or −1: no process
  * reports that, or so much. */
-static int take_progress(const run_env *env, const frame *f, int holds, reports *so_far) {
+static int take_progress(answers *a, const frame *f, int holds) {
+  reports *so_far = &a->so_far;
   const int64_t now = orb_clock_ms();
   progress_head head;
   if (now - so_far->since_ms >= 1000) {
     so_far->since_ms = now;
     so_far->count = 0;
   }
-  if (++so_far->count > REPORTS_MOST || f->size != sizeof head) {
-    return -1;
+  if (++so_far->count > REPORTS_MOST) {
+    return breach(a, "too many reports");
+  }
+  if (f->size != sizeof head) {
+    return breach(a, "a report of another size");
   }
   memcpy(&head, f->bytes, sizeof head);
   head.stage[sizeof head.stage - 1] = 0;
@@ -240,42 +261,35 @@ static int take_progress(const run_env *env, const frame *f, int holds, reports 
     so_far->stages++;
   }
   if (so_far->stages > STAGES_MOST || !is_stage(head.stage)) {
-    return -1;
+    return breach(a, so_far->stages > STAGES_MOST ? "too many stages" : "a stage without a name");
   }
   if (!holds) {
-    progress_report(env->progress, head.stage, head.fraction >= 0 && head.fraction <= 1 ? head.fraction : 0);
+    progress_report(a->env->progress, head.stage, head.fraction >= 0 && head.fraction <= 1 ? head.fraction : 0);
   }
   return 1;
 }
 
-/* Takes frames until the end: as take_done(), or −1 with the result of the channel. */
-static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j,
-                     const char *alignment, int64_t hold_ms, run_output *out, api_problem *problem,
-                     channel_result *why) {
+/* Takes frames until the end: as take_done(), or −1, also if the process died or was stopped. */
+static int listen_to(isolated *p, answers *a, run_output *out, api_problem *problem) {
   frame f;
-  made_bytes bytes = {0};
-  reports so_far = {0};
-  int count = 0;
   for (int taken = 1;;) {
-    *why = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
-    if (*why != CHANNEL_OK) {
-      return -1;
+    a->got = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
+    if (a->got == CHANNEL_STOPPED && orb_context_check(a->ctx) == ORB_OK) {
+      return breach(a, "too late after an object");
     }
+    if (a->got != CHANNEL_OK) {
+      return a->got == CHANNEL_BAD ? breach(a, ISOLATE_NO_FRAME) : -1;
+    }
+    const int over = f.type == FRAME_DONE;
     if (f.type == FRAME_PROGRESS) {
-      taken = take_progress(env, &f, out->holds, &so_far);
+      taken = take_progress(a, &f, out->holds);
     } else if (f.type == FRAME_OBJECT) {
-      taken = ++count > OBJECTS_MOST ? -1 : take_object(env, ctx, kind, j, alignment, &f, bytes, out, problem);
-      p->last_ms = out->holds ? orb_clock_ms() + hold_ms : 0;
-    } else if (f.type == FRAME_DONE) {
-      taken = take_done(j, kind, &f, bytes, out, problem);
+      taken = take_object(a, &f, out, problem);
+      p->last_ms = out->holds ? orb_clock_ms() + a->hold_ms : 0;
     } else {
-      taken = -1;
+      taken = over ? take_done(a, &f, out, problem) : breach(a, "a frame that only the service sends");
     }
-    int over = f.type == FRAME_DONE;
     frame_free(&f);
-    if (taken < 0) {
-      *why = CHANNEL_BAD;
-    }
     if (taken <= 0 || over) {
       return taken;
     }
@@ -335,21 +349,22 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
                     .max_triangles = limits->max_triangles,
                     .embed_ms = j->embed_ms};
   memcpy(task.key, j->key, sizeof task.key);
-  channel_result why = send_all(&process, &task, j->request, &inputs);
+  answers all = {
+      .env = env, .ctx = ctx, .kind = kind, .job = j, .alignment = inputs.alignment, .hold_ms = limits->hold_ms};
+  all.got = send_all(&process, &task, j->request, &inputs);
   let_go(&inputs);
-  int fine = why == CHANNEL_OK
-                 ? listen_to(&process, env, ctx, kind, j, inputs.alignment, limits->hold_ms, out, problem, &why)
-                 : -1;
+  int fine = all.got == CHANNEL_OK ? listen_to(&process, &all, out, problem) : -1;
   int status = isolate_close(&process);
   if (fine == 0 && problem->name && strcmp(problem->name, "corrupt") == 0) {
     let_go_of_made(env, out);
     out->gone |= quarantine_inputs(env, &inputs);
   }
-  if (fine >= 0 || (why == CHANNEL_STOPPED && orb_context_check(ctx) != ORB_OK)) {
+  if (fine >= 0 || (all.got == CHANNEL_STOPPED && !all.breach)) {
     return fine > 0; /* stopped: the context has the error */
   }
   end->died = 1;
+  end->broke = all.breach != NULL;
   end->status = status;
-  isolate_status_text(status, end->why, sizeof end->why);
+  isolate_end_text(all.breach, status, end->why, sizeof end->why);
   return 0;
 }

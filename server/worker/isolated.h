@@ -12,12 +12,13 @@ typedef struct isolated_limits {
 
 /* A process sends all its results at its end. From the first object on, the daemon holds the store, so deletions wait,
  * and publishers wait behind them. The next frame must therefore follow within this time: hashing the largest result
- * takes seconds on a busy machine. The daemon kills a process that is late and counts it as one that died. */
+ * takes seconds on a busy machine. The daemon kills a process that is late: it broke the protocol. */
 enum { ISOLATED_HOLD_MS = 30000 };
 
 /* How a process ended that sent neither a result nor a problem. */
 typedef struct isolated_end {
   int died;
+  int broke;     /* the daemon ended it because it broke the protocol: no other job can be the cause */
   int status;    /* as of waitpid(); −1: unknown */
   char why[100]; /* "was killed by signal 11 (Segmentation fault)" */
 } isolated_end;

@@ -247,9 +247,11 @@ static int run_somewhere(worker_pool *pool, const run_env *env, orb_context *ctx
 }
 
 /* The process of the job died. The kernel sends SIGKILL where memory is short, which another job may have caused: such
- * a job runs alone next time, and its crash counts then. */
+ * a job runs alone next time, and its crash counts then. A breach of the protocol, for which the daemon sent SIGKILL,
+ * counts at once. */
 static void crashed(const run_env *env, job *j, const isolated_end *end) {
-  int may_be_memory = end->status == -1 || (WIFSIGNALED(end->status) && WTERMSIG(end->status) == SIGKILL);
+  int may_be_memory =
+      !end->broke && (end->status == -1 || (WIFSIGNALED(end->status) && WTERMSIG(end->status) == SIGKILL));
   int counts = !may_be_memory || queue_runs_alone(env->q, j);
   char fields[128];
   snprintf(fields, sizeof fields, "\"job\":\"%s\"", job_id(j));

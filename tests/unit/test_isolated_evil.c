@@ -1,6 +1,7 @@
 /* What a job's process can do to the daemon if a mesh has taken it over. This program is its own zygote, whose
  * processes do what the request says. */
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -33,7 +34,8 @@ enum {
   LARGE_ALIGNMENT = '3',
   FLOOD = '4',
   STAGES = '5',
-  STRANGE_STAGE = '6'
+  STRANGE_STAGE = '6',
+  KILLED = '7'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -193,6 +195,9 @@ static void evil(int channel) {
       refuse_at_length(channel, 2 * VALUES);
     case LARGE_ALIGNMENT:
       send_large_alignment(channel, request);
+    case KILLED:
+      raise(SIGKILL);
+      break;
     default:
       break;
   }
@@ -275,7 +280,8 @@ static void test_an_object_and_then_no_end(void **state) {
     api_problem problem = {0};
     isolated_end end;
     assert_false(run(*state, ways[i], &problem, &end));
-    assert_true(end.died);
+    assert_true(end.died && end.broke);
+    assert_non_null(strstr(end.why, "broke the protocol: "));
     assert_null(problem.name);
   }
 }
@@ -285,14 +291,16 @@ static void test_an_object_and_then_no_end(void **state) {
 static void test_reports_without_end(void **state) {
   static const char ways[] = {FLOOD, STAGES, STRANGE_STAGE};
   static const int most[] = {5000, 64, 1}; /* reports that are shown */
+  static const char *const why[] = {"too many reports", "too many stages", "a stage without a name"};
   for (size_t i = 0; i < sizeof ways; i++) {
     stored *s = *state;
     api_problem problem = {0};
     isolated_end end;
     s->shown = 0;
     assert_false(run(s, ways[i], &problem, &end));
-    assert_true(end.died);
+    assert_true(end.died && end.broke);
     assert_in_range(s->shown, 1, most[i]);
+    assert_non_null(strstr(end.why, why[i]));
   }
 }
 
@@ -350,7 +358,16 @@ static void test_a_result_that_says_it_has_no_bytes(void **state) {
   api_problem problem = {0};
   isolated_end end;
   assert_false(run(*state, FEW_BYTES, &problem, &end));
-  assert_true(end.died);
+  assert_true(end.died && end.broke);
+}
+
+/* Memory may be short, or the process has a fault: it has not broken the protocol. */
+static void test_a_process_that_is_killed(void **state) {
+  api_problem problem = {0};
+  isolated_end end;
+  assert_false(run(*state, KILLED, &problem, &end));
+  assert_true(end.died && !end.broke);
+  assert_string_equal(end.why, "was killed by signal 9 (Killed)");
 }
 
 int main(int count, char **arguments) {
@@ -365,6 +382,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test(test_a_stop_while_bytes_arrive),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_process_that_is_killed, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
 }
