@@ -119,6 +119,15 @@ static channel_result send_all(isolated *p, const task_head *task, const char *r
   return result == CHANNEL_OK ? isolate_send(p, FRAME_GO, NULL, 0, -1) : result;
 }
 
+/* Whether the process gets no row of an embedding that the job needs: it is gone, or could not be read. */
+static int lacks_embedding(const collected *all) {
+  int lacks = 0;
+  for (int i = 1; i < all->count; i++) {
+    lacks |= all->keys[i].kind == RESOURCE_EMBEDDING && !all->rows[i].json;
+  }
+  return lacks;
+}
+
 /* What a job of this kind may make. */
 static int may_make(api_job_kind kind, object_kind object) {
   return kind == API_JOB_EMBEDDING ? object == OBJECT_SPHERE
@@ -156,6 +165,7 @@ typedef struct answers {
   const run_job *job;
   const char *alignment;       /* as in collected */
   int64_t hold_ms;             /* as in isolated_limits */
+  int lacks;                   /* as lacks_embedding() */
   int objects;                 /* that have come */
   int64_t bytes[OBJECT_KINDS]; /* of each object that the process has made */
   reports so_far;
@@ -219,6 +229,12 @@ static int take_done(answers *a, const frame *f, run_output *out, api_problem *p
     free(json);
     api_problem_free(problem);
     return breach(a, "an end that is neither a result nor a problem");
+  }
+  /* A job that lacks an embedding is planned again, and its attempt does not count: it must not repeat for ever. */
+  if (done.gone && !a->lacks) {
+    free(json);
+    api_problem_free(problem);
+    return breach(a, "the claim that an embedding is gone");
   }
   out->gone = done.gone;
   out->flips = done.flips;
@@ -349,8 +365,13 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
                     .max_triangles = limits->max_triangles,
                     .embed_ms = j->embed_ms};
   memcpy(task.key, j->key, sizeof task.key);
-  answers all = {
-      .env = env, .ctx = ctx, .kind = kind, .job = j, .alignment = inputs.alignment, .hold_ms = limits->hold_ms};
+  answers all = {.env = env,
+                 .ctx = ctx,
+                 .kind = kind,
+                 .job = j,
+                 .alignment = inputs.alignment,
+                 .hold_ms = limits->hold_ms,
+                 .lacks = lacks_embedding(&inputs)};
   all.got = send_all(&process, &task, j->request, &inputs);
   let_go(&inputs);
   int fine = all.got == CHANNEL_OK ? listen_to(&process, &all, out, problem) : -1;

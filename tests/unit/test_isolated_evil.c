@@ -35,7 +35,9 @@ enum {
   FLOOD = '4',
   STAGES = '5',
   STRANGE_STAGE = '6',
-  KILLED = '7'
+  KILLED = '7',
+  GONE = '8',
+  GONE_SPHERE = '9'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
@@ -144,6 +146,14 @@ _Noreturn static void claim_no_bytes(int channel, const task_head *task) {
   task_end(channel, &done, "{}", NULL);
 }
 
+/* Says that an embedding that the job needs has been deleted. */
+_Noreturn static void say_gone(int channel) {
+  done_head done = {.gone = 1};
+  api_problem problem = {0};
+  api_refuse(&problem, "not-found", "An embedding is gone.");
+  task_end(channel, &done, NULL, &problem);
+}
+
 /* Reports progress for ever. */
 _Noreturn static void report(int channel, const char *const stages[2], int pause_us) {
   for (int i = 0;; i++) {
@@ -195,6 +205,9 @@ static void evil(int channel) {
       refuse_at_length(channel, 2 * VALUES);
     case LARGE_ALIGNMENT:
       send_large_alignment(channel, request);
+    case GONE:
+    case GONE_SPHERE:
+      say_gone(channel);
     case KILLED:
       raise(SIGKILL);
       break;
@@ -232,9 +245,9 @@ static void add_damaged_mesh(stored *s, const char *id) {
 }
 
 /* Runs a job in a process that does this. Afterwards nothing holds the store. */
-static int run(stored *s, char what, api_problem *problem, isolated_end *end) {
+static int run_for(stored *s, char what, run_output *out, api_problem *problem, isolated_end *end) {
   char key[API_ID_SIZE], mesh[API_ID_SIZE], request[512];
-  const int merges = what == LARGE_ALIGNMENT;
+  const int merges = what == LARGE_ALIGNMENT || what == GONE || what == GONE_SPHERE;
   fill_id(key, what);
   fill_id(mesh, 'e');
   snprintf(request, sizeof request,
@@ -244,16 +257,21 @@ static int run(stored *s, char what, api_problem *problem, isolated_end *end) {
            mesh, mesh);
   const run_job j = {.key = key, .request = request};
   const isolated_limits limits = {.memory = 64 << 20, .threads = 1, .max_triangles = 1000, .hold_ms = 300};
-  run_output out = {0};
+  *out = (run_output){0};
   int fine =
-      isolated_run(&s->env, s->ctx, merges ? API_JOB_SUPERMESH : API_JOB_EMBEDDING, &j, &limits, &out, problem, end);
-  if (out.holds) {
+      isolated_run(&s->env, s->ctx, merges ? API_JOB_SUPERMESH : API_JOB_EMBEDDING, &j, &limits, out, problem, end);
+  if (out->holds) {
     objects_let_go(s->env.store);
   }
   assert_true(objects_exclude(s->env.store));
   objects_let_go(s->env.store);
-  resource_free(&out.row);
+  resource_free(&out->row);
   return fine;
+}
+
+static int run(stored *s, char what, api_problem *problem, isolated_end *end) {
+  run_output out;
+  return run_for(s, what, &out, problem, end);
 }
 
 /* To move the input to quarantine, the daemon waits for everyone who holds the store: the job must not be one of them.
@@ -361,6 +379,38 @@ static void test_a_result_that_says_it_has_no_bytes(void **state) {
   assert_true(end.died && end.broke);
 }
 
+/* The embedding of the mesh, whose key is that of a request with default options. */
+static void add_embedding(stored *s) {
+  char json[] = "{}";
+  int fresh;
+  api_embedding_request request = {0};
+  resource row = {.kind = RESOURCE_EMBEDDING, .json = json, .bytes = 1, .created = 1};
+  api_json_error error;
+  api_problem ignored = {0};
+  char text[API_ID_SIZE + 16], mesh[API_ID_SIZE];
+  fill_id(mesh, 'e');
+  snprintf(text, sizeof text, "{\"mesh\":\"%s\"}", mesh);
+  cJSON *body = api_json_parse(text, strlen(text), &error);
+  assert_true(api_embedding_request_read(body, &request, &ignored) && api_embedding_request_id(&request, row.id));
+  cJSON_Delete(body);
+  assert_int_equal(catalogue_put_for(s->env.cat, &row, "", 0, &fresh), STORE_OK);
+}
+
+/* A job that lacks an embedding is queued again without a count. So the daemon believes that only of an embedding whose
+ * row it has not found itself. */
+static void test_an_embedding_that_is_said_to_be_gone(void **state) {
+  api_problem problem = {0};
+  isolated_end end;
+  run_output out;
+  assert_false(run_for(*state, GONE, &out, &problem, &end));
+  assert_true(!end.died && out.gone);
+  api_problem_free(&problem);
+  add_embedding(*state);
+  assert_false(run_for(*state, GONE_SPHERE, &out, &problem, &end));
+  assert_true(end.died && end.broke && !out.gone);
+  assert_null(problem.name);
+}
+
 /* Memory may be short, or the process has a fault: it has not broken the protocol. */
 static void test_a_process_that_is_killed(void **state) {
   api_problem problem = {0};
@@ -382,6 +432,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test(test_a_stop_while_bytes_arrive),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_an_embedding_that_is_said_to_be_gone, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_is_killed, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
