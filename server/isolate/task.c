@@ -66,7 +66,7 @@ int task_read_object(const frame *f, object_head *head) {
     return 0;
   }
   memcpy(head, f->bytes, sizeof *head);
-  return head->start >= 0 && head->size >= 0;
+  return head->start >= 0 && head->size >= 0 && (unsigned)head->kind < OBJECT_KINDS;
 }
 
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem) {

@@ -14,9 +14,6 @@
 
 enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 2 };
 
-/* Alignment, asset, places and spheres. */
-enum { OBJECTS_MOST = 4 };
-
 typedef struct collected {
   resource_key keys[INPUTS_MOST];
   object_kind objects[INPUTS_MOST];
@@ -164,9 +161,9 @@ typedef struct answers {
   api_job_kind kind;
   const run_job *job;
   const char *alignment;       /* as in collected */
-  int64_t hold_ms;             /* as in isolated_limits */
+  int64_t hold_ms;             /* for which the process may still let the daemon wait while it holds the store */
   int lacks;                   /* as lacks_embedding() */
-  int objects;                 /* that have come */
+  unsigned kinds;              /* of the objects that have come: a bit each */
   int64_t bytes[OBJECT_KINDS]; /* of each object that the process has made */
   reports so_far;
   channel_result got; /* the last result of the channel */
@@ -182,9 +179,13 @@ static int breach(answers *a, const char *what) {
 static int take_object(answers *a, const frame *f, run_output *out, api_problem *problem) {
   const run_env *env = a->env;
   object_head head;
-  if (!task_read_object(f, &head) || ++a->objects > OBJECTS_MOST) {
-    return breach(a, "too many objects, or one without its size or its file");
+  if (!task_read_object(f, &head)) {
+    return breach(a, "an object without its size or its file");
   }
+  if (a->kinds & 1u << head.kind) {
+    return breach(a, "two objects of a kind");
+  }
+  a->kinds |= 1u << head.kind;
   if (head.kind == OBJECT_ALIGNMENT && a->kind == API_JOB_SUPERMESH) {
     if (!a->alignment[0] || memcmp(head.id, a->alignment, sizeof head.id) != 0 || out->holds) {
       return breach(a, "another alignment than that of the job");
@@ -285,11 +286,21 @@ static int take_progress(answers *a, const frame *f, int holds) {
   return 1;
 }
 
+/* Receives a frame. While the daemon holds the store, it waits no longer than hold_ms for all frames together. What it
+ * does with them itself, as sending an object to a bucket, does not count. */
+static channel_result receive(isolated *p, answers *a, int holds, frame *f) {
+  const int64_t began = orb_clock_ms();
+  p->last_ms = holds ? began + a->hold_ms : 0;
+  const channel_result got = isolate_receive(p, CHANNEL_ANSWER_MOST, f);
+  a->hold_ms -= holds ? orb_clock_ms() - began : 0;
+  return got;
+}
+
 /* Takes frames until the end: as take_done(), or −1, also if the process died or was stopped. */
 static int listen_to(isolated *p, answers *a, run_output *out, api_problem *problem) {
   frame f;
   for (int taken = 1;;) {
-    a->got = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
+    a->got = receive(p, a, out->holds, &f);
     if (a->got == CHANNEL_STOPPED && orb_context_check(a->ctx) == ORB_OK) {
       return breach(a, "too late after an object");
     }
@@ -301,7 +312,6 @@ static int listen_to(isolated *p, answers *a, run_output *out, api_problem *prob
       taken = take_progress(a, &f, out->holds);
     } else if (f.type == FRAME_OBJECT) {
       taken = take_object(a, &f, out, problem);
-      p->last_ms = out->holds ? orb_clock_ms() + a->hold_ms : 0;
     } else {
       taken = over ? take_done(a, &f, out, problem) : breach(a, "a frame that only the service sends");
     }

@@ -11,8 +11,8 @@ typedef struct isolated_limits {
 } isolated_limits;
 
 /* A process sends all its results at its end. From the first object on, the daemon holds the store, so deletions wait,
- * and publishers wait behind them. The next frame must therefore follow within this time: hashing the largest result
- * takes seconds on a busy machine. The daemon kills a process that is late: it broke the protocol. */
+ * and publishers wait behind them. It therefore waits for all further frames together no longer than this: hashing the
+ * largest result takes seconds on a busy machine. The daemon kills a process that is late: it broke the protocol. */
 enum { ISOLATED_HOLD_MS = 30000 };
 
 /* How a process ended that sent neither a result nor a problem. */

@@ -37,10 +37,11 @@ enum {
   STRANGE_STAGE = '6',
   KILLED = '7',
   GONE = '8',
-  GONE_SPHERE = '9'
+  GONE_SPHERE = '9',
+  SLOW = '0'
 };
 
-enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20 };
+enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20, HOLD_MS = 300 };
 
 typedef struct stored {
   char data[64];
@@ -87,8 +88,8 @@ static int teardown(void **state) {
 
 /* ---- the process ---- */
 
-static void send_object(int channel, const task_head *task) {
-  object_head head = {.kind = OBJECT_SPHERE, .size = 6};
+static void send_kind(int channel, const task_head *task, object_kind kind) {
+  object_head head = {.kind = kind, .size = 6};
   int fd = memfd_create("object", MFD_CLOEXEC);
   const struct iovec part = {&head, sizeof head};
   memcpy(head.id, task->key, sizeof head.id);
@@ -97,6 +98,10 @@ static void send_object(int channel, const task_head *task) {
     _exit(9);
   }
   close(fd);
+}
+
+static void send_object(int channel, const task_head *task) {
+  send_kind(channel, task, OBJECT_SPHERE);
 }
 
 static void send_progress(int channel, const char *stage) {
@@ -143,6 +148,17 @@ _Noreturn static void send_large_alignment(int channel, const char *text) {
 _Noreturn static void claim_no_bytes(int channel, const task_head *task) {
   done_head done = {.fine = 1};
   send_object(channel, task);
+  task_end(channel, &done, "{}", NULL);
+}
+
+/* A result whose objects come so that each pause is within the limit on the hold, but not all together. */
+_Noreturn static void send_slowly(int channel, const task_head *task) {
+  static const object_kind kinds[] = {OBJECT_ASSET, OBJECT_PLACES, OBJECT_SPHERES};
+  done_head done = {.fine = 1, .bytes = 18};
+  for (int i = 0; i < 3; i++) {
+    send_kind(channel, task, kinds[i]);
+    usleep(1000 * HOLD_MS * 2 / 3);
+  }
   task_end(channel, &done, "{}", NULL);
 }
 
@@ -208,6 +224,8 @@ static void evil(int channel) {
     case GONE:
     case GONE_SPHERE:
       say_gone(channel);
+    case SLOW:
+      send_slowly(channel, &task);
     case KILLED:
       raise(SIGKILL);
       break;
@@ -247,7 +265,7 @@ static void add_damaged_mesh(stored *s, const char *id) {
 /* Runs a job in a process that does this. Afterwards nothing holds the store. */
 static int run_for(stored *s, char what, run_output *out, api_problem *problem, isolated_end *end) {
   char key[API_ID_SIZE], mesh[API_ID_SIZE], request[512];
-  const int merges = what == LARGE_ALIGNMENT || what == GONE || what == GONE_SPHERE;
+  const int merges = what == LARGE_ALIGNMENT || what == GONE || what == GONE_SPHERE || what == SLOW;
   fill_id(key, what);
   fill_id(mesh, 'e');
   snprintf(request, sizeof request,
@@ -256,7 +274,7 @@ static int run_for(stored *s, char what, run_output *out, api_problem *problem, 
                   : "{\"mesh\":\"%s\"}",
            mesh, mesh);
   const run_job j = {.key = key, .request = request};
-  const isolated_limits limits = {.memory = 64 << 20, .threads = 1, .max_triangles = 1000, .hold_ms = 300};
+  const isolated_limits limits = {.memory = 64 << 20, .threads = 1, .max_triangles = 1000, .hold_ms = HOLD_MS};
   *out = (run_output){0};
   int fine =
       isolated_run(&s->env, s->ctx, merges ? API_JOB_SUPERMESH : API_JOB_EMBEDDING, &j, &limits, out, problem, end);
@@ -293,7 +311,7 @@ static void test_an_object_and_then_a_damaged_input(void **state) {
 /* After its first object the process neither ends nor dies. The context has no deadline: only the limit on the hold
  * ends it. */
 static void test_an_object_and_then_no_end(void **state) {
-  static const char ways[] = {NOTHING, PROGRESS, OBJECTS};
+  static const char ways[] = {NOTHING, PROGRESS};
   for (size_t i = 0; i < sizeof ways; i++) {
     api_problem problem = {0};
     isolated_end end;
@@ -301,6 +319,18 @@ static void test_an_object_and_then_no_end(void **state) {
     assert_true(end.died && end.broke);
     assert_non_null(strstr(end.why, "broke the protocol: "));
     assert_null(problem.name);
+  }
+}
+
+static void test_objects_that_hold_the_store(void **state) {
+  static const char ways[] = {OBJECTS, SLOW};
+  static const char *const why[] = {"two objects of a kind", "too late after an object"};
+  for (size_t i = 0; i < sizeof ways; i++) {
+    api_problem problem = {0};
+    isolated_end end;
+    assert_false(run(*state, ways[i], &problem, &end));
+    assert_true(end.died && end.broke);
+    assert_non_null(strstr(end.why, why[i]));
   }
 }
 
@@ -428,6 +458,7 @@ int main(int count, char **arguments) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_an_object_and_then_a_damaged_input, setup, teardown),
       cmocka_unit_test_setup_teardown(test_an_object_and_then_no_end, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_objects_that_hold_the_store, setup, teardown),
       cmocka_unit_test_setup_teardown(test_reports_without_end, setup, teardown),
       cmocka_unit_test(test_a_stop_while_bytes_arrive),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
