@@ -98,10 +98,11 @@ static void take_passed(struct msghdr *message, int *passed) {
   }
 }
 
-/* Asks before each part whether it continues: another end that sends without a pause never lets this one wait. */
-static channel_result receive_all(int fd, void *to, size_t size, int *passed, channel_continues continues, void *user) {
+/* parts: of the frame so far. */
+static channel_result receive_all(int fd, void *to, size_t size, int *passed, int *parts, channel_continues continues,
+                                  void *user) {
   for (size_t done = 0; done < size;) {
-    if (continues && !continues(user)) {
+    if (++*parts > CHANNEL_UNASKED && continues && !continues(user)) {
       return CHANNEL_STOPPED;
     }
     char control[CMSG_SPACE(4 * sizeof(int))];
@@ -127,8 +128,9 @@ static channel_result receive_all(int fd, void *to, size_t size, int *passed, ch
 
 channel_result channel_receive(int fd, size_t most, frame *out, channel_continues continues, void *user) {
   head begin;
+  int parts = 0;
   *out = (frame){.fd = -1};
-  channel_result result = receive_all(fd, &begin, sizeof begin, &out->fd, continues, user);
+  channel_result result = receive_all(fd, &begin, sizeof begin, &out->fd, &parts, continues, user);
   if (result == CHANNEL_OK &&
       (begin.version != CHANNEL_VERSION || begin.type == 0 || begin.type >= FRAME_TYPES || begin.size > most)) {
     result = CHANNEL_BAD;
@@ -140,7 +142,7 @@ channel_result channel_receive(int fd, size_t most, frame *out, channel_continue
     out->type = (frame_type)begin.type;
     out->size = begin.size;
     out->bytes[begin.size] = 0;
-    result = receive_all(fd, out->bytes, begin.size, &out->fd, continues, user);
+    result = receive_all(fd, out->bytes, begin.size, &out->fd, &parts, continues, user);
   }
   if (result != CHANNEL_OK) {
     frame_free(out);

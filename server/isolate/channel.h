@@ -33,9 +33,11 @@ typedef struct frame {
   size_t size;
 } frame;
 
-/* Called before each part that is received, and while the other end lets this one wait at least every CHANNEL_LOOK_MS:
- * 0 gives up. NULL: never. */
-enum { CHANNEL_LOOK_MS = 20 };
+/* Called while the other end lets this one wait, at least every CHANNEL_LOOK_MS: 0 gives up. What has arrived is
+ * received without asking, since it may be the last that was waited for. But another end that sends without a pause
+ * never lets this one wait, so it is called, too, before each part of a frame after the first CHANNEL_UNASKED: the
+ * largest answer, of 4 MB, has 20 parts or more, as a socket holds some 200 KB. NULL: never. */
+enum { CHANNEL_LOOK_MS = 20, CHANNEL_UNASKED = 64 };
 typedef int (*channel_continues)(void *user);
 
 /* Closed: also if this end has no memory for the frame. Bad: what arrived is no frame, or a larger one than allowed. */

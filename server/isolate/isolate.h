@@ -35,11 +35,13 @@ typedef struct isolated {
   int (*wanted)(void *user);  /* 0: cancel the context; NULL: never */
   void *user;
   int64_t last_ms; /* orb_clock_ms() at which waiting ends; 0: only the context ends it */
+  int unasked;     /* frames received since the context was asked last */
 } isolated;
 
 /* Forks a process; 0 with the reason logged. Starts a new zygote if it has died. Blocks for about a millisecond. */
 int isolate_open(isolated *p, orb_context *ctx);
 channel_result isolate_send(isolated *p, frame_type type, const struct iovec *parts, int count, int passed);
+/* Frames that have arrived are received even if the context has ended, but not more than CHANNEL_UNASKED of them. */
 channel_result isolate_receive(isolated *p, size_t most, frame *out);
 /* Kills the process unless it has ended, and logs what it wrote to standard error. Returns its status as of waitpid();
  * −1: unknown. */

@@ -415,6 +415,7 @@ int isolate_open(isolated *p, orb_context *ctx) {
 
 static int continues(void *user) {
   isolated *p = user;
+  p->unasked = 0;
   if (p->wanted && !p->wanted(p->user)) {
     orb_context_cancel(p->ctx);
   }
@@ -426,6 +427,10 @@ channel_result isolate_send(isolated *p, frame_type type, const struct iovec *pa
 }
 
 channel_result isolate_receive(isolated *p, size_t most, frame *out) {
+  if (++p->unasked > CHANNEL_UNASKED && !continues(p)) {
+    *out = (frame){.fd = -1};
+    return CHANNEL_STOPPED;
+  }
   return channel_receive(p->channel, most, out, continues, p);
 }
 

@@ -352,28 +352,44 @@ static void test_reports_without_end(void **state) {
   }
 }
 
-static int continues_for(void *user) {
-  int *left = user;
-  return --*left > 0;
-}
-
-/* All that is received has arrived before, so the daemon never waits for the process. It is asked for each part even
- * so. */
+/* All that is received has arrived before, so the daemon never waits for the process. The context is asked even so. */
 static void test_a_stop_while_bytes_arrive(void **state) {
-  enum { FRAMES = 20 };
-  int ends[2], left = FRAMES, taken = 0;
+  enum { FRAMES = 3 * CHANNEL_UNASKED / 2 };
+  const stored *s = *state;
+  int ends[2], taken = 0;
   frame f;
-  (void)state;
   assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends), 0);
+  isolated p = {.channel = ends[0], .ctx = s->ctx};
   for (int i = 0; i < FRAMES; i++) {
     send_progress(ends[1], "embed");
   }
   channel_result got;
-  while ((got = channel_receive(ends[0], CHANNEL_ANSWER_MOST, &f, continues_for, &left)) == CHANNEL_OK) {
+  orb_context_cancel(s->ctx);
+  while ((got = isolate_receive(&p, CHANNEL_ANSWER_MOST, &f)) == CHANNEL_OK) {
     frame_free(&f);
     assert_true(++taken < FRAMES);
   }
   assert_int_equal(got, CHANNEL_STOPPED);
+  close(ends[0]);
+  close(ends[1]);
+}
+
+/* The deadline passes while the daemon stores an object: the end that the process has sent by then counts. */
+static void test_an_end_that_arrived_in_time(void **state) {
+  int ends[2];
+  frame f;
+  orb_context *ctx;
+  done_head done = {.fine = 1};
+  (void)state;
+  assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends), 0);
+  assert_int_equal(orb_context_create(&(orb_context_options){.threads = 1, .deadline_ms = 1}, &ctx), ORB_OK);
+  isolated p = {.channel = ends[0], .ctx = ctx};
+  assert_int_equal(task_answer(ends[1], &done, "{}", NULL), CHANNEL_OK);
+  assert_int_equal(isolate_receive(&p, CHANNEL_ANSWER_MOST, &f), CHANNEL_OK);
+  assert_int_equal(f.type, FRAME_DONE);
+  frame_free(&f);
+  assert_int_equal(isolate_receive(&p, CHANNEL_ANSWER_MOST, &f), CHANNEL_STOPPED);
+  orb_context_destroy(ctx);
   close(ends[0]);
   close(ends[1]);
 }
@@ -460,7 +476,8 @@ int main(int count, char **arguments) {
       cmocka_unit_test_setup_teardown(test_an_object_and_then_no_end, setup, teardown),
       cmocka_unit_test_setup_teardown(test_objects_that_hold_the_store, setup, teardown),
       cmocka_unit_test_setup_teardown(test_reports_without_end, setup, teardown),
-      cmocka_unit_test(test_a_stop_while_bytes_arrive),
+      cmocka_unit_test_setup_teardown(test_a_stop_while_bytes_arrive, setup, teardown),
+      cmocka_unit_test(test_an_end_that_arrived_in_time),
       cmocka_unit_test_setup_teardown(test_answers_that_cost_memory, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
       cmocka_unit_test_setup_teardown(test_an_embedding_that_is_said_to_be_gone, setup, teardown),
