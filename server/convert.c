@@ -49,6 +49,9 @@ static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out,
     const int fits = task_read_object(&f, &head);
     store_result stored = fits ? objects_copy(store, ctx, f.fd, head.start, head.size, out) : STORE_OK;
     bytes = head.size;
+    if (fits) {
+      task_free_object(&f, &head);
+    }
     frame_free(&f);
     *breach = fits ? NULL : "an object without its size or its file";
     if (!fits || stored != STORE_OK) {

@@ -1,5 +1,6 @@
 #include "isolate/task.h"
 
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,6 +68,12 @@ int task_read_object(const frame *f, object_head *head) {
   }
   memcpy(head, f->bytes, sizeof *head);
   return head->start >= 0 && head->size >= 0 && (unsigned)head->kind < OBJECT_KINDS;
+}
+
+void task_free_object(const frame *f, const object_head *head) {
+  if (head->size > 0) {
+    (void)fallocate(f->fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, head->start, head->size);
+  }
 }
 
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem) {

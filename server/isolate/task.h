@@ -73,6 +73,9 @@ _Noreturn void task_end(int channel, done_head *done, const char *json, const ap
 
 /* The daemon's side. Reads FRAME_OBJECT; 0: it is none. */
 int task_read_object(const frame *f, object_head *head);
+/* Frees the memory of an object that the daemon has copied: else all results of a process are in memory until it ends.
+ * What the process passed is its own file, as it gets all others for reading only. */
+void task_free_object(const frame *f, const object_head *head);
 /* Reads FRAME_DONE: json is allocated with malloc(), or NULL. The caller checks it with task_json().
  * 0: the result contradicts itself. */
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem);

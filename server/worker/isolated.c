@@ -132,10 +132,12 @@ static int may_make(api_job_kind kind, object_kind object) {
 }
 
 /* Keeps an alignment, whose row has the hash of its bytes. */
-static void take_alignment(const run_env *env, orb_context *ctx, const char *id, const object_head *head, int fd) {
+static void take_alignment(const run_env *env, orb_context *ctx, const char *id, const object_head *head,
+                           const frame *f) {
   object_temp temp = {.fd = -1};
-  if (objects_copy(env->store, ctx, fd, head->start, head->size, &temp) != STORE_OK ||
-      alignments_publish(env->cat, env->store, id, env->tenant, &temp) != STORE_OK) {
+  const store_result stored = objects_copy(env->store, ctx, f->fd, head->start, head->size, &temp);
+  task_free_object(f, head);
+  if (stored != STORE_OK || alignments_publish(env->cat, env->store, id, env->tenant, &temp) != STORE_OK) {
     log_warn("the alignment %s could not be kept", id);
   }
   objects_abandon(&temp);
@@ -190,7 +192,7 @@ static int take_object(answers *a, const frame *f, run_output *out, api_problem 
     if (!a->alignment[0] || memcmp(head.id, a->alignment, sizeof head.id) != 0 || out->holds) {
       return breach(a, "another alignment than that of the job");
     }
-    take_alignment(env, a->ctx, a->alignment, &head, f->fd);
+    take_alignment(env, a->ctx, a->alignment, &head, f);
     return 1;
   }
   if (!may_make(a->kind, head.kind) || memcmp(head.id, a->job->key, sizeof head.id) != 0) {
@@ -202,6 +204,7 @@ static int take_object(answers *a, const frame *f, run_output *out, api_problem 
   }
   object_temp temp = {.fd = -1};
   store_result stored = objects_copy(env->store, a->ctx, f->fd, head.start, head.size, &temp);
+  task_free_object(f, &head);
   a->bytes[head.kind] = head.size;
   stored = stored == STORE_OK ? objects_publish(env->store, &temp, head.kind, head.id) : stored;
   objects_abandon(&temp);
