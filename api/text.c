@@ -89,8 +89,7 @@ void api_json_close(api_text *text, char close) {
 }
 
 /* Bytes that are not UTF-8 become U+FFFD: details quote requests, and truncation may split a character. */
-static void quoted(api_text *text, const char *s) {
-  api_text_append(text, "\"", 1);
+static void escaped(api_text *text, const char *s) {
   const char *run = s;
   for (size_t n; *s; s += n) {
     unsigned char c = (unsigned char)*s;
@@ -112,6 +111,11 @@ static void quoted(api_text *text, const char *s) {
     }
   }
   api_text_append(text, run, (size_t)(s - run));
+}
+
+static void quoted(api_text *text, const char *s) {
+  api_text_append(text, "\"", 1);
+  escaped(text, s);
   api_text_append(text, "\"", 1);
 }
 
@@ -188,6 +192,38 @@ void api_json_member_string(api_text *text, const char *name, const char *utf8) 
   api_json_key(text, name);
   api_json_string(text, utf8);
 }
+/* DEL, the controls C1 and those of text in two directions (Unicode, UAX 9). Returns the code; 0: another character. */
+static unsigned hidden_control(const unsigned char *s, size_t length) {
+  unsigned code = s[0];
+  if (length == 2) {
+    code = (s[0] & 0x1fu) << 6 | (s[1] & 0x3fu);
+  } else if (length == 3) {
+    code = (s[0] & 0x0fu) << 12 | (s[1] & 0x3fu) << 6 | (s[2] & 0x3fu);
+  }
+  const int two_ways = code == 0x061c || code == 0x200e || code == 0x200f || (code >= 0x202a && code <= 0x202e) ||
+                       (code >= 0x2066 && code <= 0x2069);
+  return length < 4 && ((code >= 0x7f && code <= 0x9f) || two_ways) ? code : 0;
+}
+
+void api_json_member_output(api_text *text, const char *name, const char *bytes, size_t size) {
+  api_json_key(text, name);
+  api_text_append(text, "\"", 1);
+  for (size_t at = 0, n; at < size; at += n) {
+    const unsigned char *s = (const unsigned char *)bytes + at;
+    const size_t whole = *s ? orb_utf8_length(s, size - at) : 0;
+    const unsigned code = whole ? hidden_control(s, whole) : 0;
+    char character[5] = "";
+    n = whole ? whole : 1;
+    memcpy(character, s, n);
+    if (code) {
+      api_text_printf(text, "\\u%04x", code);
+    } else {
+      escaped(text, whole ? character : "\xef\xbf\xbd");
+    }
+  }
+  api_text_append(text, "\"", 1);
+}
+
 void api_json_member_number(api_text *text, const char *name, double value) {
   api_json_key(text, name);
   api_json_number(text, value);

@@ -42,6 +42,9 @@ void api_json_raw(api_text *text, const char *json); /* a complete value; NULL w
 
 /* JSON members. */
 void api_json_member_string(api_text *text, const char *name, const char *utf8);
+/* Bytes of any kind, for people who look at them in a terminal: what moves its cursor, or the order of its text, is
+ * escaped. NUL becomes U+FFFD. */
+void api_json_member_output(api_text *text, const char *name, const char *bytes, size_t size);
 void api_json_member_number(api_text *text, const char *name, double value);
 void api_json_member_integer(api_text *text, const char *name, int64_t value);
 void api_json_member_bool(api_text *text, const char *name, int value);

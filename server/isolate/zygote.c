@@ -436,14 +436,13 @@ channel_result isolate_receive(isolated *p, size_t most, frame *out) {
 
 /* Logs what a process wrote to standard error as a part of a line. */
 static void log_said(int said) {
-  char text[SAID_MOST + 1];
+  char text[SAID_MOST];
   api_text fields = {0};
   ssize_t size = read(said, text, SAID_MOST);
   if (size <= 0) {
     return;
   }
-  text[size] = 0;
-  api_json_member_string(&fields, "wrote", text);
+  api_json_member_output(&fields, "wrote", text, (size_t)size);
   if (!fields.failed) {
     log_write(LOG_WARN, fields.data, "a process of a job or a check wrote to its standard error");
   }

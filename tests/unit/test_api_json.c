@@ -321,6 +321,22 @@ static void test_formatted(void **state) {
 }
 
 /* A refusal for handles says how many loops it omits, and says nothing if it has all of them. */
+/* RFC 8259 for the escapes, UAX 9 for the controls of text in two directions. Other characters stay as they are. */
+static void test_output_of_a_program(void **state) {
+  static const char bytes[] =
+      "a\0b\x7f\xc2\x9b"
+      "31m\xe2\x80\xae\xe2\x81\xa6\xd8\x9c\xff\x1b\n\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\xe2\x80";
+  api_text text = {0};
+  (void)state;
+  api_json_member_output(&text, "wrote", bytes, sizeof bytes - 1);
+  assert_string_equal(
+      text.data,
+      "\"wrote\":\"a\xef\xbf\xbd"
+      "b\\u007f\\u009b31m\\u202e\\u2066\\u061c\xef\xbf\xbd\\u001b\\n\\\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80"
+      "\xef\xbf\xbd\xef\xbf\xbd\"");
+  api_text_free(&text);
+}
+
 static void test_loops_left_out(void **state) {
   (void)state;
   orb_error *error = calloc(1, sizeof *error);
@@ -359,6 +375,7 @@ int main(void) {
                                      cmocka_unit_test(test_supermesh_requests),
                                      cmocka_unit_test(test_stored_meshes),
                                      cmocka_unit_test(test_routes),
+                                     cmocka_unit_test(test_output_of_a_program),
                                      cmocka_unit_test(test_loops_left_out)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -92,9 +92,9 @@ static void keep_files(const task_head *task, done_head *done) {
   snprintf(done->detail, sizeof done->detail, "%d %d %d", megabytes, made, mapped);
 }
 
-/* Writes lines that look like the daemon's, more than a pipe holds. */
+/* Writes lines that look like the daemon's, more than a pipe holds. NUL and the control CSI (U+009B) end each. */
 static void forge(const task_head *task) {
-  static const char line[] = "{\"audit\":\"delete\",\"token\":\"root\"}\n";
+  static const char line[] = "{\"audit\":\"delete\",\"token\":\"root\"}\0\xc2\x9b\n";
   enum { LINES = 5000 };
   task_confine(task);
   for (int i = 0; i < LINES; i++) {
@@ -224,6 +224,8 @@ static void test_lines_that_look_like_those_of_the_log(void **state) {
   assert_ptr_equal(strchr(text, '\n'), text + size - 1); /* a single line */
   assert_memory_equal(text, before, sizeof before - 1);
   assert_non_null(strstr(text, within));
+  assert_non_null(strstr(text, "\xef\xbf\xbd\\u009b\\n{")); /* NUL does not end the text */
+  assert_null(strstr(text, "\xc2\x9b"));
   assert_in_range(size, 1, 4096);
 }
 
