@@ -29,7 +29,7 @@ HEAD = """# The first answer
 
 Written by `tests/bench/first_answer.py`. It alternates between version {base} and this version in one run with {threads}
 threads; the numbers are medians of {repeat}. A ratio is {base} / this version: more than 1 is faster. *CPU* and *wall*
-cover everything from the files to the asset; the stages are CPU seconds on one machine with {cores} cores. *Energy* is
+cover everything from the files to the asset; the stages are ratios of their wall seconds, on one machine with {cores} cores. *Energy* is
 that of the map, *triangles* are those of the supermesh, both as base → now. The load average at the end was {load:.0f}:
 with other load, the seconds are upper bounds, and the ratios hold, since both versions met the same load.
 
@@ -164,7 +164,7 @@ def main():
     programs = {"base": build_base(options.base), "now": options.bin}
     text = HEAD.format(base=options.base, threads=options.threads, repeat=options.repeat, cores=os.cpu_count(),
                        load=os.getloadavg()[0])
-    text += "Columns of stages are ratios of their wall seconds.\n\n" + line(COLUMNS) + "|---" * len(COLUMNS) + "|\n"
+    text += line(COLUMNS) + "|---" * len(COLUMNS) + "|\n"
     ratios = []
     with tempfile.TemporaryDirectory() as folder:
         for row in rows(options, folder):
