@@ -73,9 +73,9 @@ static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out,
   return *breach ? -1 : 1;
 }
 
-/* The process died, or was ended for a breach. SIGKILL counts: the service kills only for a breach and for the context,
- * which the caller has asked, so otherwise memory was short. An unknown end without a breach does not: all processes
- * end so with the one that forks them. */
+/* The process died, or was ended for a breach. SIGKILL by another than the service counts: memory was short. An unknown
+ * end without a breach does not: all processes end so with the one that forks them, and so does one that the service
+ * ends because it fails itself. */
 static int refuse_dead(catalogue *cat, const char *id, const char *tenant, const task_head *task, const char *breach,
                        int status, api_problem *problem) {
   char why[100];

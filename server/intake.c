@@ -224,9 +224,9 @@ static int check_isolated(const intake_file *file, const task_head *task, const 
     return 0;
   }
   isolate_end_text(end.breach, end.status, why, sizeof why);
-  /* SIGKILL counts: the service kills only for a breach, which is the file's fault, and for the context, seen above. So
-   * otherwise memory was short, and a file may need that much each time. An unknown end without a breach does not: all
-   * processes end so with the one that forks them. */
+  /* SIGKILL by another than the service counts: memory was short, and a file may need that much each time. An unknown
+   * end without a breach does not: all processes end so with the one that forks them, and so does one that the service
+   * ends because it fails itself. */
   *died = end.breach || end.status != -1;
   log_error("the process that checked mesh %s %s", file->id, why);
   return api_refuse(problem, "job-crashed",

@@ -44,7 +44,7 @@ channel_result isolate_send(isolated *p, frame_type type, const struct iovec *pa
 /* Frames that have arrived are received even if the context has ended, but not more than CHANNEL_UNASKED of them. */
 channel_result isolate_receive(isolated *p, size_t most, frame *out);
 /* Kills the process unless it has ended, and logs what it wrote to standard error. Returns its status as of waitpid();
- * −1: unknown. */
+ * −1: unknown, or killed here. */
 int isolate_close(isolated *p);
 /* Describes an end without an answer. breach: what the process sent against the protocol, for which the daemon ended it
  * ("broke the protocol: too many reports"); NULL: describes its status, which is not 0 ("was killed by signal 11
