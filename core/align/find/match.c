@@ -226,8 +226,10 @@ static orb_status fill_trials(orb_trials *t, int are_unlike) {
     ORB_GO(status, orb_trials_make(t), end);
   }
   ORB_GO(status, orb_trials_rank(t), end);
-  if (!t->hint.tells) {
+  if (t->hint.count == 0) { /* landmarks draw the best trial along its map, which crossing does not change */
     ORB_GO(status, orb_trials_cross(t), end);
+  }
+  if (!t->hint.tells) {
     status = orb_trials_weigh_asymmetry(small, t);
   }
 end:

@@ -250,7 +250,7 @@ static const double ORB_FIND_HINT_STRETCH = 0.16, ORB_FIND_HINT_STRETCH_MOST = 0
 static const double ORB_FIND_HINT_OFF = 0.5;
 /* The same for landmarks that do not tell whether the shapes are one body, one to three mostly: the mean over so few is
  * rough, and a right map of other kinds may leave the end of a limb far from its place. Of 84 pairs of animals of other
- * kinds with one landmark, 67, 74 and 75 are right with 0.5, 1 and 1.5. The distance as a factor of the cost did not
+ * kinds with one landmark, 67, 74 and 75 were right with 0.5, 1 and 1.5. The distance as a factor of the cost did not
  * help. */
 static const double ORB_FIND_HINT_OFF_FEW = 1.5;
 /* A rough map is not registered either if it maps the landmarks this many times as far from their partners as the best
