@@ -192,6 +192,7 @@ void api_json_member_string(api_text *text, const char *name, const char *utf8) 
   api_json_key(text, name);
   api_json_string(text, utf8);
 }
+
 /* DEL, the controls C1 and those of text in two directions (Unicode, UAX 9). Returns the code; 0: another character. */
 static unsigned hidden_control(const unsigned char *s, size_t length) {
   unsigned code = s[0];

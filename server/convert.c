@@ -73,15 +73,13 @@ static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out,
   return *breach ? -1 : 1;
 }
 
-/* The process died, or was ended for a breach. SIGKILL by another than the service counts: memory was short. An unknown
- * end without a breach does not: all processes end so with the one that forks them, and so does one that the service
- * ends because it fails itself. */
+/* The process died, or was ended for a breach. */
 static int refuse_dead(catalogue *cat, const char *id, const char *tenant, const task_head *task, const char *breach,
                        int status, api_problem *problem) {
   char why[100];
   isolate_end_text(breach, status, why, sizeof why);
   log_error("the process that converted the asset of supermesh %s %s", id, why);
-  if (breach || status != -1) {
+  if (isolate_end_counts(breach, status)) {
     catalogue_crash_of(cat, task->key, id, tenant, (int64_t)time(NULL) * 1000);
   }
   return api_refuse(problem, "job-crashed",

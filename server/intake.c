@@ -224,10 +224,7 @@ static int check_isolated(const intake_file *file, const task_head *task, const 
     return 0;
   }
   isolate_end_text(end.breach, end.status, why, sizeof why);
-  /* SIGKILL by another than the service counts: memory was short, and a file may need that much each time. An unknown
-   * end without a breach does not: all processes end so with the one that forks them, and so does one that the service
-   * ends because it fails itself. */
-  *died = end.breach || end.status != -1;
+  *died = isolate_end_counts(end.breach, end.status);
   log_error("the process that checked mesh %s %s", file->id, why);
   return api_refuse(problem, "job-crashed",
                     "The process that read the file died. Please report this as a bug, with the file.");

@@ -235,12 +235,13 @@ static orb_status search_within(work *w, double limit) {
     }
     double length = limit * (1 + slack);
     int32_t closing = search(w, w->seed[i], INT64_MAX, &length);
-    const int within = closing >= 0 && length<limit, is_long = w->settled> LONG_SEARCH;
-    if (within) {
+    const int is_within = closing >= 0 && length < limit;
+    const int is_long = w->settled > LONG_SEARCH;
+    if (is_within) {
       ORB_TRY(keep(w, closing));
     }
     if (is_long) {
-      pass_near(w, (within ? SLACK * length : length - limit) / 2);
+      pass_near(w, (is_within ? SLACK * length : length - limit) / 2);
     }
     slack = is_long ? SLACK : 0;
     ORB_TRY(pay(w, w->settled));

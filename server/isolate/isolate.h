@@ -51,6 +51,12 @@ int isolate_close(isolated *p);
  * (Segmentation fault)"). */
 void isolate_end_text(const char *breach, int status, char *out, size_t room);
 
+/* Whether an end without an answer counts as a crash of the work, which had the process to itself. A breach counts, and
+ * so does SIGKILL by another than the daemon: memory was short, and the work may need that much each time. An unknown
+ * end does not: all processes end so with the one that forks them, and so does one that the daemon ends because it
+ * fails itself. */
+int isolate_end_counts(const char *breach, int status);
+
 /* A breach: CHANNEL_BAD. */
 #define ISOLATE_NO_FRAME "bytes that are no frame, or too large a one"
 

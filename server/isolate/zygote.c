@@ -481,6 +481,10 @@ int isolate_close(isolated *p) {
   return status;
 }
 
+int isolate_end_counts(const char *breach, int status) {
+  return breach || status != -1;
+}
+
 void isolate_end_text(const char *breach, int status, char *out, size_t room) {
   if (breach) {
     snprintf(out, room, "broke the protocol: %s", breach);

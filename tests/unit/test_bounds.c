@@ -321,15 +321,21 @@ static double usual_seconds_a_byte(void) {
   return least;
 }
 
-/* A bowl: a fan of so many triangles from the bottom to the rim, which is one hole. */
-static text bowl(int edges) {
+/* A binary PLY file of triangles as far as its header. */
+static text ply_head(int vertices, int triangles) {
   text t = {0};
   char head[300];
   add(&t, head,
       (size_t)snprintf(head, sizeof head,
                        "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
                        "property float z\nelement face %d\nproperty list uchar int vertex_indices\nend_header\n",
-                       edges + 1, edges));
+                       vertices, triangles));
+  return t;
+}
+
+/* A bowl: a fan of so many triangles from the bottom to the rim, which is one hole. */
+static text bowl(int edges) {
+  text t = ply_head(edges + 1, edges);
   for (int v = 0; v <= edges; v++) {
     const double angle = 2 * 3.14159265358979323846 * v / edges;
     const float p[3] = {v ? (float)cos(angle) : 0, v ? (float)sin(angle) : 0, v ? 0 : -1};
@@ -389,13 +395,7 @@ static void test_filled_hole(void **state) {
 
 /* A torus of n times n squares, and what its loops are: around the tube n edges, through the hole as many. */
 static text torus(int n) {
-  text t = {0};
-  char head[256];
-  add(&t, head,
-      (size_t)snprintf(head, sizeof head,
-                       "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
-                       "property float z\nelement face %d\nproperty list uchar int vertex_indices\nend_header\n",
-                       n * n, 2 * n * n));
+  text t = ply_head(n * n, 2 * n * n);
   for (int i = 0; i < n * n; i++) {
     const double a = 2 * M_PI * (i / n) / n, b = 2 * M_PI * (i % n) / n;
     const float p[3] = {(float)((3 + cos(b)) * cos(a)), (float)((3 + cos(b)) * sin(a)), (float)sin(b)};

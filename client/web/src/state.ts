@@ -282,11 +282,13 @@ const HUES = [
 ];
 export const hue = (index: number) => HUES[index % HUES.length];
 
+/** The landmarks that have a place on each of the shapes: those of a request, in its order. */
+export const landmarksOnAll = (shapes = readyShapes()): Landmark[] =>
+  state.landmarks.filter((landmark) => shapes.length > 0 && shapes.every((shape) => landmark.at[shape.key]));
+
 /** The landmarks that are set on every shape, in the daemon's format. */
 export function wireLandmarks(shapes = readyShapes()): WireLandmark[] {
-  return state.landmarks
-    .filter((landmark) => shapes.length > 0 && shapes.every((shape) => landmark.at[shape.key]))
-    .map((landmark) => ({ name: landmark.name, at: shapes.map((shape) => landmark.at[shape.key].place) }));
+  return landmarksOnAll(shapes).map(({ name, at }) => ({ name, at: shapes.map(({ key }) => at[key].place) }));
 }
 
 /** The landmarks that a morph would use. */

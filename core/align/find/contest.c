@@ -113,7 +113,7 @@ static double lead_of_second(const contest *c) {
   return fmax(0, 1 - own / fmin(its, poor));
 }
 
-/* Takes the better map. Of two that are as good, the first of the contestants wins. */
+/* Takes the better map. That of the next best match must be clearly better. */
 static orb_status take_winner(orb_context *ctx, contest *c, orb_contest_result *out) {
   const int32_t first = c->count == 2 && c->round[1] < c->round[0], second = c->count - 1 - first;
   int32_t winner = c->round[first];

@@ -7,8 +7,8 @@
 /* If the best trial bends the shapes more than ORB_FIND_EXTENDS, extends all that are not dropped side by side, each up
  * to ORB_FIND_EXTENSIONS times in a row, or ORB_FIND_EXTENSIONS_MIRRORED times if the copies have symmetries. The best
  * extension of a trial replaces it if that costs less. The trials must have been ranked, and their surveys have
- * distances. Landmarks are not asked: the next ranking drops an extension that takes them elsewhere. Each extension of
- * small copies takes 0.01 s of one thread. */
+ * distances. An extension that takes landmarks elsewhere replaces nothing. Each extension of small copies takes 0.01 s
+ * of one thread. */
 ORB_MUST_CHECK orb_status orb_trials_extend(orb_trials *trials);
 
 #endif

@@ -107,7 +107,8 @@ end:
 }
 
 /* Settles the fine copy of shape s on that of the other one, and carries its pose to all vertices. */
-static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial *one, int s, double **target) {
+static orb_status write_targets(orb_context *ctx, const orb_match *match, orb_trial *one, int s, double **target) {
+  const orb_trials *t = match->trials;
   const orb_mesh *fine = &t->fine[s].mesh, *mesh = t->mesh[s];
   const orb_trial_scaling *own = &t->scaling[s], *other = &t->scaling[1 - s];
   orb_elastic_pose pose = {NULL, NULL}, all = {NULL, NULL};
@@ -128,7 +129,7 @@ static orb_status write_targets(orb_context *ctx, const orb_trials *t, orb_trial
   }
   ORB_GO(status, orb_elastic_carry(ctx, &t->copy[s].mesh, &one->pose[s], fine->positions, fine->vertex_count, &pose),
          end);
-  const int rounds = (one->bend[0] + one->bend[1]) / 2 > t->walks_above ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
+  const int rounds = (one->bend[0] + one->bend[1]) / 2 > match->walks_above ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
   ORB_GO(status, orb_elastic_settle(ctx, fine, &t->fine[1 - s].mesh, &held, rounds, &pose), end);
   for (size_t i = 0; i < count; i++) {
     points[i] = (mesh->positions[i] - own->middle[i % 3]) * own->scale;
@@ -247,7 +248,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     ORB_TRY(take_hint(t, hint, &stretch));
   }
   out->is_unlike = stretch > ORB_FIND_HINT_STRETCH_MOST;
-  out->walks_above = t->walks_above = out->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
+  out->walks_above = out->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
   if (hint && stretch > hint->stretch) {
     return ORB_OK;
   }
@@ -295,7 +296,7 @@ orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n,
   if (!(one->cost < INFINITY)) { /* it was dropped before its way back was registered */
     ORB_TRY(orb_trials_complete(ctx, t, t->list[n]));
   }
-  return one->cost < INFINITY ? write_targets(ctx, t, one, moving, target) : ORB_OK;
+  return one->cost < INFINITY ? write_targets(ctx, match, one, moving, target) : ORB_OK;
 }
 
 static size_t target_count(const orb_match *match) {

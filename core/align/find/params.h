@@ -203,8 +203,8 @@ static const double ORB_FIND_WALKS_EARLY = 0.14;
  * Of 41 pairs, the shape that moved with less energy both ways was the less round one in 35; in the others the volumes
  * were closer than this, but for two. */
 static const double ORB_FIND_LESS_ROUND = 0.8;
-/* Of two finished walks, the later one replaces the first if it exceeds 1 by less than this share of what that does:
- * walks of one match differ by as much. */
+/* The finished walk of the next best match replaces that of the best one if it exceeds 1 by less than this share of
+ * what that does: walks of one match differ by as much. */
 static const double ORB_FIND_CONTEST_GAIN = 0.95;
 /* The second best walk is finished as well if it exceeds 1 by at most this many times what the best one does: walks
  * towards one match differ by a tenth, so they do not tell closer ones apart. */

@@ -2,7 +2,18 @@
 import type { Landmark as WireLandmark, Place, Supermesh } from 'orbmorph';
 import { work } from '../mesh/work';
 import type { Spot } from '../mesh/worker';
-import { patch, readyShapes, set, state, toast, wireLandmarks, type Landmark, type Result, type Shape } from '../state';
+import {
+  landmarksOnAll,
+  patch,
+  readyShapes,
+  set,
+  state,
+  toast,
+  wireLandmarks,
+  type Landmark,
+  type Result,
+  type Shape,
+} from '../state';
 
 let count = 0;
 
@@ -80,9 +91,8 @@ export async function followSuggestion({ supermesh, request }: Result, { landmar
   const given = (supermesh.request ?? request)?.landmarks;
   const shapes = readyShapes();
   const shape = shapes[number];
-  const here = state.landmarks.filter((l) => shapes.every(({ key }) => l.at[key]));
   const before = Array.isArray(given) ? given[landmark]?.at[number] : undefined;
-  const own = shape && here[landmark];
+  const own = shape && landmarksOnAll(shapes)[landmark];
   if (!own || JSON.stringify(own.at[shape.key].place) !== JSON.stringify(before))
     return toast('The landmarks are others now. Morph again to see whether one may be misplaced.');
   const [spot] = await work('locate', shape.key, [at], true);
