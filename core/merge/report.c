@@ -9,7 +9,7 @@
 #include "merge/warn.h"
 #include "numeric/vec3.h"
 
-enum { ALL_PAIRS_UP_TO = 4 }; /* shapes; the pairs of more are only the neighbours, so that their number is linear */
+enum { ALL_PAIRS_UP_TO = 4 };      /* shapes; of more, only some pairs are reported, so that their number is linear */
 static const double SLIVER = 0.02; /* quality() below which a triangle's stretch is mostly rounding */
 
 /* A landmark without a supermesh vertex (rotate, or rbf inside triangles) is measured at the mean of its points on the
@@ -172,11 +172,18 @@ orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb
   return name_found(ctx, shapes, out);
 }
 
+/* Maps are composed from the first shape to each other one, and a morph goes from each shape to the next. */
+static int is_reported(int32_t shape_count, int32_t a, int32_t b) {
+  return shape_count <= ALL_PAIRS_UP_TO || a == 0 || b == a + 1;
+}
+
 static int32_t list_pairs(int32_t shape_count, orb_pair_report *pairs) {
   int32_t count = 0;
   for (int32_t a = 0; a < shape_count; a++) {
-    int32_t last = shape_count <= ALL_PAIRS_UP_TO || a + 1 >= shape_count ? shape_count - 1 : a + 1;
-    for (int32_t b = a + 1; b <= last; b++) {
+    for (int32_t b = a + 1; b < shape_count; b++) {
+      if (!is_reported(shape_count, a, b)) {
+        continue;
+      }
       if (pairs) {
         pairs[count].a = a;
         pairs[count].b = b;

@@ -203,9 +203,58 @@ static void an_overlay_of_crumpled_shapes_inverts_nothing(void **state) {
   orb_context_destroy(ctx);
 }
 
+/* Each ellipsoid is three times as long as the one before, which no warning tells; the last one is 81 times as long as
+ * the first. So the map that is wrong is not one between neighbours. */
+static void maps_of_the_first_of_many_shapes_are_reported(void **state) {
+  (void)state;
+  enum { SHAPES = 5 };
+  orb_context *ctx;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh ball = shape_ball(ctx, 3), longer[SHAPES];
+  orb_align_shape shapes[SHAPES];
+  const char *names[SHAPES] = {"1", "3", "9", "27", "81"};
+  orb_place places[4][SHAPES];
+  orb_landmark landmarks[4] = {0};
+  static const double at[4][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}};
+  for (int s = 0; s < SHAPES; s++) {
+    longer[s] = shape_ball(ctx, 3);
+    stretch(&longer[s], pow(3, s), 1, 1);
+    shapes[s] = (orb_align_shape){&longer[s], ball.positions};
+    for (int i = 0; i < 4; i++) {
+      const int32_t v = vertex_at(&ball, ball.positions, at[i][0], at[i][1], at[i][2]);
+      assert_int_equal(orb_place_of_vertex(ctx, &longer[s], v, &places[i][s]), ORB_OK);
+      landmarks[i].at = places[i];
+    }
+  }
+  orb_merge_options options;
+  orb_merge_defaults(&options);
+  options.align.method = ORB_ALIGN_ROTATE;
+  options.remesh.method = ORB_REMESH_SUBDIVISION;
+  orb_merge_result result;
+  assert_int_equal(orb_merge(ctx, shapes, names, SHAPES, landmarks, 4, &options, &result), ORB_OK);
+  static const int32_t pairs[][2] = {{0, 1}, {0, 2}, {0, 3}, {0, 4}, {1, 2}, {2, 3}, {3, 4}};
+  assert_int_equal(result.pair_count, 7);
+  for (int i = 0; i < 7; i++) {
+    assert_true(result.pairs[i].a == pairs[i][0] && result.pairs[i].b == pairs[i][1]);
+  }
+  int last = 0;
+  for (int32_t i = 0; i < result.warning_count; i++) {
+    last += result.warnings[i].kind == ORB_WARNING_STRETCHED && result.warnings[i].a == 0 && result.warnings[i].b == 4;
+    assert_int_equal(result.warnings[i].a, 0);
+  }
+  assert_int_equal(last, 1);
+  orb_merge_result_free(ctx, &result);
+  for (int s = 0; s < SHAPES; s++) {
+    shape_free(ctx, &longer[s]);
+  }
+  shape_free(ctx, &ball);
+  orb_context_destroy(ctx);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(two_ellipsoids), cmocka_unit_test(one_shape_is_refused),
                                      cmocka_unit_test(shapes_of_no_size_are_refused),
-                                     cmocka_unit_test(an_overlay_of_crumpled_shapes_inverts_nothing)};
+                                     cmocka_unit_test(an_overlay_of_crumpled_shapes_inverts_nothing),
+                                     cmocka_unit_test(maps_of_the_first_of_many_shapes_are_reported)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

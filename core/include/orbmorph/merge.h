@@ -36,7 +36,8 @@ typedef struct orb_merge_timings {
 
 /* Distortion of the composed map from shape a to shape b, a < b. Triangles of the supermesh that are slivers
  * on a or b (height below about a ninetieth of the longest side) do not count, unless nearly all are. Up to four shapes
- * have a report for each pair; more shapes have one for each pair of neighbours in their order. */
+ * have a report for each pair; more shapes have one for the first with each other one, and for each pair of neighbours
+ * in their order. */
 enum { ORB_INVERTED_LISTED = 32 };
 
 typedef struct orb_pair_report {
