@@ -239,6 +239,15 @@ end:
   return status;
 }
 
+/* Landmarks exclude that the shapes are one body; one may be a part of the other one. */
+static orb_status give_up(orb_trials *t, int walks, orb_match *out) {
+  if (!walks || !orb_inset_is_possible(t)) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_trials_survey(t, 0));
+  return orb_inset_find(t, &out->inset);
+}
+
 static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
                       int walks, orb_match *out) {
   orb_trials *t = out->trials;
@@ -250,8 +259,10 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->is_unlike = stretch > ORB_FIND_HINT_STRETCH_MOST;
   out->walks_above = out->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
   if (hint && stretch > hint->stretch) {
-    return ORB_OK;
+    return give_up(t, walks, out);
   }
+  const int seeks =
+      walks && !out->is_unlike && orb_inset_is_possible(t); /* of unlike ones, give_up() has looked for a part */
   double bend = INFINITY;
   if (!out->is_unlike) { /* the trial that landmarks make would bend unlike shapes too much */
     ORB_TRY(orb_trials_try_hinted(t, &bend));
@@ -265,7 +276,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   }
   int32_t best = orb_trials_best(t);
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
-    return ORB_OK;
+    return seeks ? orb_inset_find(t, &out->inset) : ORB_OK;
   }
   out->is_unsure = !suits_hint(&t->trial[best], hint, stretch);
   if (out->is_unsure) {
@@ -275,7 +286,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->moves = roundness(&t->copy[0].mesh) < ORB_FIND_LESS_ROUND * roundness(&t->copy[1].mesh) ? 0 : 1;
   orb_trials_list(t);
   ORB_TRY(write_ranking(t, out));
-  if (!hint && walks && out->bend > ORB_FIND_INSET_BENDS) {
+  if (seeks && out->bend > ORB_FIND_INSET_BENDS) {
     ORB_TRY(orb_inset_find(t, &out->inset));
   }
   return orb_trials_refine(t, walks && out->bend > out->walks_above ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);

@@ -59,7 +59,8 @@ typedef struct orb_match_other {
 typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_match {
-  int is_found; /* 0: a shape has too few vertices, or no map was found; only is_unsure and is_unlike are filled then */
+  int is_found; /* 0: a shape has too few vertices, or no map was found; only is_unsure, is_unlike and inset are filled
+                   then */
   int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
   int is_unlike; /* 1: distances between landmarks exclude that the shapes are one body; a map is then only looked for
                     if the hint allows it */
@@ -76,7 +77,8 @@ typedef struct orb_match {
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  orb_inset inset;    /* whether one shape is a part of the other one; only searched if `walks` and the shapes bend */
+  orb_inset inset;    /* whether one shape is a part of the other one; only searched if `walks`, with few landmarks, and
+                         if the shapes bend or landmarks exclude that they are one body. Filled without a map too */
   double *target;     /* the caller's to set, with orb_match_target() or orb_match_aim(); freed with the match */
   orb_trials *trials; /* the candidates, for the functions below */
 } orb_match;

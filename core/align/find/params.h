@@ -124,10 +124,14 @@ static const double ORB_FIND_ASYMMETRY_COST = 1;
 enum {
   ORB_FIND_INSET_PAIRS =
       24, /* vertices that are held like landmarks: with 24 true landmarks a head lies better than with 8 */
-  ORB_FIND_INSET_SAMPLES = 200, /* vertices that follow closest points at the end */
-  ORB_FIND_INSET_LOOKUPS = 48,  /* of them that are looked up in the grid: with 32, more heads come out turned */
-  ORB_FIND_INSET_NODES = 18,    /* of the grid along the longest side of the large shape: a head has 6 then */
-  ORB_FIND_INSET_TURNED = 4,    /* places that are turned about their middles */
+  ORB_FIND_INSET_FEWEST = 8,     /* of them that are held beside landmarks; fewer do not keep a part in its place */
+  ORB_FIND_INSET_FITTED = 3,     /* landmarks whose similarity is the only start */
+  ORB_FIND_INSET_LANDMARKS = 16, /* most landmarks with which a part is looked for: more show one by themselves
+                                   (map/space/part.h) */
+  ORB_FIND_INSET_SAMPLES = 200,  /* vertices that follow closest points at the end */
+  ORB_FIND_INSET_LOOKUPS = 48,   /* of them that are looked up in the grid: with 32, more heads come out turned */
+  ORB_FIND_INSET_NODES = 18,     /* of the grid along the longest side of the large shape: a head has 6 then */
+  ORB_FIND_INSET_TURNED = 4,     /* places that are turned about their middles */
   ORB_FIND_INSET_STAGES = 5,
   ORB_FIND_INSET_SIZES = 4
 };
@@ -174,6 +178,10 @@ static const double ORB_FIND_INSET_SMALLEST = 0.4, ORB_FIND_INSET_LARGEST = 0.75
 /* The share of the part that lies on the large shape. Of 98 heads on busts, half of them turned, 96 are found at the
  * right place, with 0.79 to 0.97. Of 525 pairs of other shapes, 5 have 0.69 to 0.75 with as little that is stray. */
 static const double ORB_FIND_INSET_SHARE = 0.78;
+/* From the second stage on, no landmark ends farther from its partner than OFF. In three heads on busts, the right place
+ * has up to 0.3, and others have 2 and more; of 27, one is missed with 0.5. Pairs nearer to a landmark than APART are not held.
+ * In radii of a ball of the part's area, and for APART of each shape's. */
+static const double ORB_FIND_INSET_OFF = 0.8, ORB_FIND_INSET_APART = 0.25;
 /* A map of a part with more energy than this is not taken: heads on busts have 1.4 to 4.3. */
 static const double ORB_FIND_INSET_MOST_ENERGY = 10;
 /* What the part does not cover is one piece, but for this share of the large shape. Busts have up to 0.06, and a horse

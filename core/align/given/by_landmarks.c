@@ -8,6 +8,7 @@
 #include "align/find/contest.h"
 #include "align/find/match.h"
 #include "align/find/params.h"
+#include "align/given/part.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "align/sheet/even.h"
@@ -82,8 +83,10 @@ typedef struct two_ways {
   orb_alignment pinned; /* once has_tried_pins; empty if the pins have no room */
   double loose;         /* the energy of its map before that is fitted in space */
   int has_tried_pins, lacks_room;
-  int fits_part; /* that map is drawn to where parts of the shapes fit, so its energy does not compare */
-  int walked;    /* the pins of two shapes meet in a map that a landmark walk has led to */
+  int fits_part;   /* that map is drawn to where parts of the shapes fit, so its energy does not compare */
+  int walked;      /* the pins of two shapes meet in a map that a landmark walk has led to */
+  int seeks_part;  /* one of two shapes may be a part of the other one */
+  orb_inset inset; /* it is: there is nothing else to try then */
 } two_ways;
 
 /* Two shapes have two ways, unless the map is to be refined as far as it goes. */
@@ -219,7 +222,9 @@ static orb_status compose_posed(orb_context *ctx, const posing *all, int32_t i) 
   ORB_GO(status, find_posed(ctx, all, s, walks, &match), done);
   out->is_unsure = match.is_unsure;
   out->is_unlike = match.is_unlike;
-  if (match.is_found) {
+  if (c->seeks_part && match.inset.count > 0) {
+    c->inset = match.inset;
+  } else if (match.is_found) {
     status = walks && orb_contest_is_open(&match, c->posed.keeps_angles) ? follow_by_walks(ctx, c, &match, out)
                                                                          : follow_targets(ctx, c, s, &match, out);
   }
@@ -386,11 +391,62 @@ static int is_enough(const two_ways *c) {
 
 static orb_status hold(two_ways *c) {
   ORB_TRY(try_pose(c, ORB_FIND_HINT_STRETCH));
-  if (is_enough(c)) {
+  if (c->inset.count > 0 || is_enough(c)) {
     return ORB_OK;
   }
   ORB_TRY(try_pins(c));
   return c->lacks_room ? ORB_OK : improve(c);
+}
+
+/* The better of the two ways. inset: NULL, or it is filled if one shape is a part of the other one; `out` is empty
+ * then. */
+static orb_status align_two_ways(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                 const orb_landmark *landmarks, int32_t landmark_count,
+                                 const orb_align_options *options, orb_inset *inset, orb_alignment *out) {
+  two_ways c = {.ctx = ctx,
+                .shapes = shapes,
+                .shape_count = shape_count,
+                .landmarks = landmarks,
+                .landmark_count = landmark_count,
+                .options = options,
+                .seeks_part = inset != NULL};
+  orb_status status = hold(&c);
+  orb_alignment *winner = c.posed.is_found ? &c.posed.alignment : &c.pinned;
+  memset(out, 0, sizeof *out);
+  if (status == ORB_OK && c.inset.count > 0) {
+    *inset = c.inset;
+  } else if (status == ORB_OK && winner->shapes) {
+    *out = *winner;
+    memset(winner, 0, sizeof *winner);
+  } else if (status == ORB_OK) { /* again, for the error */
+    status = orb_align_by_method(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+  }
+  orb_alignment_free(ctx, &c.pinned);
+  posed_free(ctx, &c.posed);
+  return status;
+}
+
+/* Aligns a part and its whole: what lies on each other in space is held beside the landmarks. A map of least energy
+ * would spread the part over the whole. `out` stays empty if the pairs cannot be met, or if their map is bad. */
+static orb_status align_part(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
+                             int32_t landmark_count, const orb_align_options *options, const orb_inset *inset,
+                             orb_alignment *out) {
+  orb_part_landmarks all;
+  orb_status status;
+  ORB_GO(status, orb_part_landmarks_create(ctx, shapes, landmarks, landmark_count, inset, &all), end);
+  if (all.count > landmark_count) {
+    status = align_two_ways(ctx, shapes, 2, all.landmark, all.count, options, NULL, out);
+    status = orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;
+  }
+  if (out->shapes && !(out->energy <= ORB_FIND_INSET_MOST_ENERGY)) {
+    orb_alignment_free(ctx, out);
+  }
+  if (out->shapes) {
+    out->landmark_count = landmark_count; /* forgets the pairs, which come last */
+  }
+end:
+  orb_part_landmarks_free(ctx, &all);
+  return status;
 }
 
 /* A match comes first, unless the landmarks show that the shapes are not one body in two poses. It knows the surface
@@ -400,22 +456,12 @@ static orb_status hold(two_ways *c) {
 orb_status orb_align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                   const orb_landmark *landmarks, int32_t landmark_count,
                                   const orb_align_options *options, orb_alignment *out) {
-  two_ways c = {.ctx = ctx,
-                .shapes = shapes,
-                .shape_count = shape_count,
-                .landmarks = landmarks,
-                .landmark_count = landmark_count,
-                .options = options};
-  orb_status status = hold(&c);
-  orb_alignment *winner = c.posed.is_found ? &c.posed.alignment : &c.pinned;
-  memset(out, 0, sizeof *out);
-  if (status == ORB_OK && winner->shapes) {
-    *out = *winner;
-    memset(winner, 0, sizeof *winner);
-  } else if (status == ORB_OK) { /* again, for the error */
-    status = orb_align_by_method(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+  orb_inset inset = {0};
+  ORB_TRY(align_two_ways(ctx, shapes, shape_count, landmarks, landmark_count, options, &inset, out));
+  if (inset.count > 0) {
+    ORB_TRY(align_part(ctx, shapes, landmarks, landmark_count, options, &inset, out));
   }
-  orb_alignment_free(ctx, &c.pinned);
-  posed_free(ctx, &c.posed);
-  return status;
+  return inset.count == 0 || out->shapes
+             ? ORB_OK
+             : align_two_ways(ctx, shapes, shape_count, landmarks, landmark_count, options, NULL, out);
 }

@@ -6,7 +6,6 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
-#include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
 /* A place of the small shape on the large one. */
@@ -15,55 +14,12 @@ typedef struct tried {
   double score; /* mean weight of its closest points; 0: left */
 } tried;
 
-/* Weighted sums of closest points: Σ w, Σ w x, Σ w y, Σ w |x|² and Σ w y xᵀ, of samples x that go to y. */
-typedef struct sums {
-  double weight, from[3], to[3], square, covariance[9];
-} sums;
-
-static void add(sums *s, double weight, const double x[3], const double y[3]) {
-  s->weight += weight;
-  s->square += weight * orb_dot(x, x);
-  orb_add_outer(s->covariance, y, x, weight);
-  for (int k = 0; k < 3; k++) {
-    s->from[k] += weight * x[k];
-    s->to[k] += weight * y[k];
-  }
-}
-
-/* The similarity of least squares. Returns 0 where the points leave it open. */
-static int solve(sums *s, orb_similarity *out) {
-  double rotation[9], trace = 0, moved[3];
-  if (!(s->weight > 0)) {
-    return 0;
-  }
-  for (int i = 0; i < 9; i++) {
-    s->covariance[i] -= s->to[i / 3] * s->from[i % 3] / s->weight;
-  }
-  const double square = s->square - orb_dot(s->from, s->from) / s->weight;
-  if (!(square > 0) || !orb_nearest_rotation(s->covariance, rotation)) {
-    return 0;
-  }
-  for (int i = 0; i < 9; i++) {
-    trace += rotation[i] * s->covariance[i];
-  }
-  if (!(trace > 0)) {
-    return 0;
-  }
-  memcpy(out->rotation, rotation, sizeof rotation);
-  out->scale = trace / square;
-  orb_rotate_point(rotation, s->from, moved);
-  for (int k = 0; k < 3; k++) {
-    out->shift[k] = (s->to[k] - out->scale * moved[k]) / s->weight;
-  }
-  return 1;
-}
-
 /* Follows closest points once, with the first `count` samples. near: NULL, then feet on the planes of the grid stand
  * for the nearest places; or a place for each sample, see orb_inset_nearest(). moves 0: measures only. Returns the mean
  * weight before, or 0 if there is no way on. */
 static double follow(const orb_inset_pair *c, int32_t count, double width, int moves, orb_place *near,
                      orb_similarity *s) {
-  sums sum;
+  orb_similarity_sums sum;
   memset(&sum, 0, sizeof sum);
   for (int32_t i = 0; i < count; i++) {
     const orb_inset_sample *x = &c->sample[i];
@@ -74,14 +30,14 @@ static double follow(const orb_inset_pair *c, int32_t count, double width, int m
                             : orb_inset_grid_foot(c->grid, p, at, other);
     const double facing = off < INFINITY ? orb_dot(own, other) : 0;
     if (facing > 0) {
-      add(&sum, facing * exp(-off * off / (2 * width * width)), x->position, at);
+      orb_similarity_add(&sum, facing * exp(-off * off / (2 * width * width)), x->position, at);
     }
   }
   const double score = sum.weight / count;
   if (!moves) {
     return score;
   }
-  return solve(&sum, s) && s->scale > ORB_FIND_INSET_LOST_BELOW && s->scale < 1 ? score : 0;
+  return orb_similarity_solve(&sum, s) && s->scale > ORB_FIND_INSET_LOST_BELOW && s->scale < 1 ? score : 0;
 }
 
 /* How far two places of the part are apart. */
@@ -138,9 +94,30 @@ static int32_t turn_again(const orb_inset_pair *c, double width, tried *all, int
   return count;
 }
 
+/* Does every landmark end near its partner? */
+static int keeps_landmarks(const orb_inset_pair *c, const orb_similarity *at) {
+  for (size_t i = 0; i < (size_t)c->landmark_count; i++) {
+    double p[3];
+    orb_similarity_apply(at, c->landmark[0] + 3 * i, p);
+    if (sqrt(orb_distance2(p, c->landmark[1] + 3 * i)) > ORB_FIND_INSET_OFF * at->scale) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+int orb_inset_fit(const orb_inset_pair *c, orb_similarity *out) {
+  orb_similarity_sums sums = {0};
+  for (size_t i = 0; i < (size_t)c->landmark_count; i++) {
+    orb_similarity_add(&sums, 1, c->landmark[0] + 3 * i, c->landmark[1] + 3 * i);
+  }
+  return orb_similarity_solve(&sums, out) && out->scale > ORB_FIND_INSET_LOST_BELOW && out->scale < 1 &&
+         keeps_landmarks(c, out);
+}
+
 orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *c, const orb_similarity *start, int32_t count,
                             orb_similarity *out, double *score) {
-  enum { ROOM = ORB_INSET_STARTS + ORB_FIND_INSET_TURNED * (1 + ORB_INSET_FINE_TURNS) };
+  enum { ROOM = 2 * ORB_INSET_STARTS + ORB_FIND_INSET_TURNED * (1 + ORB_INSET_FINE_TURNS) };
   orb_place near[ORB_FIND_INSET_SAMPLES];
   orb_status status = ORB_OK;
   tried *all = ORB_NEW(ctx, tried, ROOM);
@@ -164,6 +141,7 @@ orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *c, const orb
       for (int r = 0; r < stage->rounds && all[i].score > 0; r++) {
         all[i].score = follow(c, samples, stage->width, 1, is_last ? near : NULL, &all[i].at);
       }
+      all[i].score = n == 0 || keeps_landmarks(c, &all[i].at) ? all[i].score : 0;
       ORB_GO(status, orb_context_check(ctx), end);
     }
   }

@@ -11,10 +11,16 @@ typedef struct orb_inset_pair {
   const orb_mesh *large;
   const orb_nearest *tree;    /* of `large` */
   const orb_inset_grid *grid; /* likewise */
+  int32_t landmark_count;
+  const double *landmark[2]; /* on the small shape and on the large one, 3 each */
 } orb_inset_pair;
 
-/* Lets all starts follow closest points by the stages of ORB_FIND_INSET_STAGE. *score: how well the samples lie on the
- * large shape at last, 0 to 1; 0: no start has led anywhere, and `out` is not set. */
+/* The similarity of the landmarks, which alone are needed. Returns 0 if it is not that of a part. */
+int orb_inset_fit(const orb_inset_pair *pair, orb_similarity *out);
+
+/* Lets all starts, 2 · ORB_INSET_STARTS at most, follow closest points by the stages of ORB_FIND_INSET_STAGE. A place
+ * that takes a landmark far from its partner is left. *score: how well the samples lie on the large shape at last, 0 to
+ * 1; 0: no start has led anywhere, and `out` is not set. */
 ORB_MUST_CHECK orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *pair, const orb_similarity *start,
                                            int32_t count, orb_similarity *out, double *score);
 

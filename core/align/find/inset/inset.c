@@ -121,6 +121,45 @@ end:
   return status;
 }
 
+static void set_landmarks(const orb_trials *t, int large, orb_inset_pair *out) {
+  out->landmark_count = t->hint.count;
+  out->landmark[0] = t->hint.at[1 - large];
+  out->landmark[1] = t->hint.at[large];
+}
+
+int orb_inset_is_possible(const orb_trials *t) {
+  for (int large = 0; large < 2 && t->hint.count >= ORB_FIND_INSET_FITTED; large++) {
+    orb_inset_pair pair;
+    orb_similarity at;
+    set_landmarks(t, large, &pair);
+    if (orb_inset_fit(&pair, &at)) {
+      return t->hint.count <= ORB_FIND_INSET_LANDMARKS;
+    }
+  }
+  return t->hint.count < ORB_FIND_INSET_FITTED;
+}
+
+/* Where the part may lie: at the similarity of three landmarks or more; or else where the middle of the landmarks
+ * meets, or anywhere. start: room for 2 · ORB_INSET_STARTS. */
+static orb_status write_starts(orb_context *ctx, const search *c, const orb_inset_pair *pair, orb_similarity *start,
+                               int32_t *count) {
+  const int32_t landmarks = pair->landmark_count;
+  *count = landmarks >= ORB_FIND_INSET_FITTED && orb_inset_fit(pair, start);
+  if (*count == 1) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_inset_starts(ctx, &c->grid, pair->sample, start, count));
+  double middle[2][3] = {{0}};
+  for (int32_t i = 0; i < 6 * landmarks; i++) {
+    middle[i & 1][i / 2 % 3] += pair->landmark[i & 1][i / 2] / landmarks;
+  }
+  if (landmarks > 0) {
+    orb_inset_starts_at(middle[0], middle[1], start + *count);
+    *count += ORB_INSET_STARTS;
+  }
+  return ORB_OK;
+}
+
 /* Is a copy neither a point nor endless? */
 static int is_body(const orb_mesh *copy) {
   orb_extent extent;
@@ -131,7 +170,7 @@ static int is_body(const orb_mesh *copy) {
 static orb_status look(orb_context *ctx, void *arg, int32_t i) {
   search *c = (search *)arg + i;
   orb_inset_sample sample[ORB_FIND_INSET_SAMPLES];
-  orb_similarity start[ORB_INSET_STARTS];
+  orb_similarity start[2 * ORB_INSET_STARTS];
   double stray = 1;
   int32_t count;
   ORB_TRY(search_create(ctx, c->trials, c));
@@ -142,9 +181,14 @@ static orb_status look(orb_context *ctx, void *arg, int32_t i) {
     memcpy(sample[k].position, c->part->positions + 3 * (size_t)c->sample[k], sizeof sample[k].position);
     memcpy(sample[k].normal, c->normal[0] + 3 * (size_t)c->sample[k], sizeof sample[k].normal);
   }
+  orb_inset_pair pair = {
+      .sample = sample, .sample_count = c->sample_count, .large = c->whole, .tree = c->tree[1], .grid = &c->grid};
+  set_landmarks(c->trials, c->large, &pair);
+  if (pair.landmark_count >= ORB_FIND_INSET_FITTED && !orb_inset_fit(&pair, start)) {
+    return ORB_OK;
+  }
   ORB_TRY(orb_inset_grid_create(ctx, c->whole, c->tree[1], &c->grid));
-  ORB_TRY(orb_inset_starts(ctx, &c->grid, sample, start, &count));
-  const orb_inset_pair pair = {sample, c->sample_count, c->whole, c->tree[1], &c->grid};
+  ORB_TRY(write_starts(ctx, c, &pair, start, &count));
   ORB_TRY(orb_inset_follow(ctx, &pair, start, count, &c->at, &c->score));
   if (!(c->score > 0) || c->at.scale < ORB_FIND_INSET_SMALLEST || c->at.scale > ORB_FIND_INSET_LARGEST) {
     return ORB_OK;

@@ -22,7 +22,12 @@ typedef struct orb_inset {
   int32_t vertex[2][ORB_FIND_INSET_PAIRS];
 } orb_inset;
 
-/* trials: opened and surveyed. About 0.1 s of one thread, on two threads if there are two. */
+/* Do the landmarks of the trials leave open that one shape is a part of the other one, and do they not show it by
+ * themselves (map/space/part.h)? trials: opened. O(landmarks). */
+int orb_inset_is_possible(const orb_trials *trials);
+
+/* trials: opened and surveyed. A part that takes a landmark far from its partner is none. About 0.1 s of one thread, on
+ * two threads if there are two. */
 ORB_MUST_CHECK orb_status orb_inset_find(const orb_trials *trials, orb_inset *out);
 
 #endif

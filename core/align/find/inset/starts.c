@@ -6,6 +6,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "numeric/quaternion.h"
+#include "numeric/vec3.h"
 
 /* The samples at one turn and one size, when the middle of the part is at a node: how many nodes away each of them is,
  * and its normal. */
@@ -128,4 +129,18 @@ orb_status orb_inset_starts(orb_context *ctx, const orb_inset_grid *grid, const 
     ORB_TRY(orb_context_check(ctx));
   }
   return ORB_OK;
+}
+
+void orb_inset_starts_at(const double from[3], const double to[3], orb_similarity start[ORB_INSET_STARTS]) {
+  double turn[ORB_INSET_TURNS][4];
+  list_quaternions(turn);
+  for (int i = 0; i < ORB_INSET_STARTS; i++) {
+    orb_similarity *one = &start[i];
+    double moved[3];
+    one->scale = ORB_FIND_INSET_SIZE[i % ORB_FIND_INSET_SIZES];
+    orb_quaternion_rotation(turn[i / ORB_FIND_INSET_SIZES], one->rotation);
+    memset(one->shift, 0, sizeof one->shift);
+    orb_similarity_apply(one, from, moved);
+    orb_sub(to, moved, one->shift);
+  }
 }

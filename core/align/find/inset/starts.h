@@ -27,4 +27,7 @@ void orb_inset_fine_turns(double (*rotation)[9]);
 ORB_MUST_CHECK orb_status orb_inset_starts(orb_context *ctx, const orb_inset_grid *grid, const orb_inset_sample *sample,
                                            orb_similarity *start, int32_t *count);
 
+/* Writes the similarities of each turn and each size that take the point `from` of the small shape to `to`. */
+void orb_inset_starts_at(const double from[3], const double to[3], orb_similarity start[ORB_INSET_STARTS]);
+
 #endif
