@@ -248,14 +248,17 @@ static int32_t vertex_towards(const orb_mesh *mesh, const double to[3]) {
   return best;
 }
 
-/* With landmarks on the nose, the ears, the bun, the top and the neck, the head lies on the head of the bust, whichever
- * comes first: it moves in both orders. A third of its radius is allowed, two edges. */
+/* With landmarks on the nose, the ears, the bun, the top and the neck, or with the first of them alone, the head lies
+ * on the head of the bust, whichever comes first: it moves in both orders. A third of its radius is allowed, two edges.
+ */
 static void landmarks_lay_the_head_onto_the_bust(void **state) {
   (void)state;
-  enum { LANDMARKS = 8 };
+  enum { LANDMARKS = 8, CASES = 5 };
   static const double to[LANDMARKS][3] = {{1, 0, 0}, {0, 0.98, 0.2}, {0, -0.98, 0.2},    {-0.8, 0, 0.6},
                                           {0, 0, 1}, {0.6, 0, -0.8}, {-0.6, 0.5, -0.62}, {-0.6, -0.5, -0.62}};
-  for (int head = 0; head < 2; head++) {
+  static const int head_of[CASES] = {0, 1, 0, 1, 0}, count_of[CASES] = {1, 1, 3, 4, 8};
+  for (int n = 0; n < CASES; n++) {
+    const int head = head_of[n], count = count_of[n];
     scene s = {.mesh = {shape_of(head, 4, 1), shape_of(!head, 4, 1)}};
     orb_mesh ball = shape_ball(ctx, 4);
     const orb_align_shape shape[2] = {{&s.mesh[0], ball.positions}, {&s.mesh[1], ball.positions}};
@@ -263,20 +266,52 @@ static void landmarks_lay_the_head_onto_the_bust(void **state) {
     orb_landmark landmark[LANDMARKS];
     orb_align_options options;
     orb_alignment out;
-    for (int i = 0; i < LANDMARKS; i++) {
+    for (int i = 0; i < count; i++) {
       landmark[i] = (orb_landmark){.at = at[i]};
       for (int k = 0; k < 2; k++) {
         assert_int_equal(orb_place_of_vertex(ctx, &s.mesh[k], vertex_towards(&s.mesh[k], to[i]), &at[i][k]), ORB_OK);
       }
     }
     orb_align_defaults(&options);
-    assert_int_equal(orb_align(ctx, shape, 2, landmark, LANDMARKS, &options, &out), ORB_OK);
+    assert_int_equal(orb_align(ctx, shape, 2, landmark, count, &options, &out), ORB_OK);
     assert_true(out.shapes[0].certificate.valid && out.shapes[1].certificate.valid);
     assert_true(off_the_head(&s, head, 4, &out) < 0.3);
+    assert_int_equal(out.landmark_count, count);
+    for (int i = 0; i < count; i++) {
+      const int32_t *v[2] = {out.shapes[0].landmark_vertices, out.shapes[1].landmark_vertices};
+      assert_memory_equal(out.shapes[0].points + 3 * (size_t)v[0][i], out.shapes[1].points + 3 * (size_t)v[1][i],
+                          3 * sizeof(double));
+    }
     orb_alignment_free(ctx, &out);
     shape_free(ctx, &ball);
     scene_close(&s);
   }
+}
+
+/* A landmark says that the nose of the head is the foot of the bust, where no part takes it. It is kept. */
+static void landmark_excludes_the_part(void **state) {
+  (void)state;
+  scene s = {.mesh = {shape_of(0, 4, 1), shape_of(1, 4, 1)}};
+  orb_mesh ball = shape_ball(ctx, 4);
+  const orb_align_shape shape[2] = {{&s.mesh[0], ball.positions}, {&s.mesh[1], ball.positions}};
+  orb_place at[2];
+  const orb_landmark landmark = {.at = at};
+  orb_align_options options;
+  orb_alignment out;
+  int32_t lowest = 0;
+  for (int32_t v = 0; v < s.mesh[1].vertex_count; v++) {
+    lowest = s.mesh[1].positions[3 * (size_t)v + 2] < s.mesh[1].positions[3 * (size_t)lowest + 2] ? v : lowest;
+  }
+  assert_int_equal(orb_place_of_vertex(ctx, &s.mesh[0], vertex_towards(&s.mesh[0], (const double[3]){1, 0, 0}), &at[0]),
+                   ORB_OK);
+  assert_int_equal(orb_place_of_vertex(ctx, &s.mesh[1], lowest, &at[1]), ORB_OK);
+  orb_align_defaults(&options);
+  assert_int_equal(orb_align(ctx, shape, 2, &landmark, 1, &options, &out), ORB_OK);
+  assert_true(out.shapes[0].certificate.valid && out.shapes[1].certificate.valid);
+  assert_true(off_the_head(&s, 0, 4, &out) > 1);
+  orb_alignment_free(ctx, &out);
+  shape_free(ctx, &ball);
+  scene_close(&s);
 }
 
 static void threads_change_nothing(void **state) {
@@ -347,10 +382,14 @@ static void memory_runs_out(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(head_is_found_on_the_bust), cmocka_unit_test(head_is_found_on_a_turned_bust),
-      cmocka_unit_test(other_shapes_are_no_parts), cmocka_unit_test(body_without_its_limbs_is_no_part),
-      cmocka_unit_test(head_goes_to_the_head),     cmocka_unit_test(landmarks_lay_the_head_onto_the_bust),
-      cmocka_unit_test(threads_change_nothing),    cmocka_unit_test(memory_runs_out)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(head_is_found_on_the_bust),
+                                     cmocka_unit_test(head_is_found_on_a_turned_bust),
+                                     cmocka_unit_test(other_shapes_are_no_parts),
+                                     cmocka_unit_test(body_without_its_limbs_is_no_part),
+                                     cmocka_unit_test(head_goes_to_the_head),
+                                     cmocka_unit_test(landmarks_lay_the_head_onto_the_bust),
+                                     cmocka_unit_test(landmark_excludes_the_part),
+                                     cmocka_unit_test(threads_change_nothing),
+                                     cmocka_unit_test(memory_runs_out)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -178,9 +178,9 @@ static const double ORB_FIND_INSET_SMALLEST = 0.4, ORB_FIND_INSET_LARGEST = 0.75
 /* The share of the part that lies on the large shape. Of 98 heads on busts, half of them turned, 96 are found at the
  * right place, with 0.79 to 0.97. Of 525 pairs of other shapes, 5 have 0.69 to 0.75 with as little that is stray. */
 static const double ORB_FIND_INSET_SHARE = 0.78;
-/* From the second stage on, no landmark ends farther from its partner than OFF. In three heads on busts, the right place
- * has up to 0.3, and others have 2 and more; of 27, one is missed with 0.5. Pairs nearer to a landmark than APART are not held.
- * In radii of a ball of the part's area, and for APART of each shape's. */
+/* From the second stage on, no landmark ends farther from its partner than OFF. In three heads on busts, the right
+ * place has up to 0.3, and others have 2 and more; of 27, one is missed with 0.5. Pairs nearer to a landmark than APART
+ * are not held. In radii of a ball of the part's area, and for APART of each shape's. */
 static const double ORB_FIND_INSET_OFF = 0.8, ORB_FIND_INSET_APART = 0.25;
 /* A map of a part with more energy than this is not taken: heads on busts have 1.4 to 4.3. */
 static const double ORB_FIND_INSET_MOST_ENERGY = 10;
