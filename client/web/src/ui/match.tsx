@@ -36,6 +36,7 @@ function sentenceOf(result: Result): string {
     return `Not sure: ${doubt ?? 'the shapes may be matched wrongly'}. Look at it, try the next match, or set landmarks.`;
   if (verdict === 'likely')
     return `The match looks plausible, but ${doubt ? `${doubt}. Check` : 'check'} it before you rely on it.`;
+  if (verdict === 'sure') return 'The match is sure.';
   return matches && matches.at > 0
     ? `Match ${matches.at + 1} of ${matches.requests.length}; the first one was the best.`
     : '';
