@@ -101,7 +101,7 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
     status = align_shapes(ctx, copies.shapes, shape_count, copies.landmarks, landmark_count, options, out);
   }
   if (status == ORB_OK) {
-    status = orb_align_lift(ctx, &copies, landmarks, options->preset, out, lifted);
+    status = orb_align_lift(ctx, &copies, landmarks, landmark_count, options->preset, out, lifted);
   }
   orb_copies_free(ctx, &copies);
   return orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;
@@ -111,9 +111,13 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
  * misplaced.
  */
 static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
-                           const orb_align_options *options, orb_alignment *out) {
-  if (out->match.is_part) {
-    orb_alignment_forget_landmarks(ctx, out);
+                           int32_t landmark_count, const orb_align_options *options, orb_alignment *out) {
+  const int holds_part = out->landmark_count > landmark_count;
+  if (holds_part) {
+    orb_alignment_forget_landmarks(ctx, landmark_count, out);
+  }
+  if (holds_part && landmark_count > 0) { /* around the root of a part, true landmarks have much of the distortion */
+    return ORB_OK;
   }
   if (options->method != ORB_ALIGN_AUTO || out->landmark_count > 0 || out->shape_count == 1) {
     return orb_align_suspects(ctx, shapes, landmarks, options, out);
@@ -157,7 +161,7 @@ static orb_status align_by_rims(orb_context *ctx, const orb_map_params *params, 
     return ORB_OK;
   }
   ORB_TRY(status);
-  orb_alignment_forget_landmarks(ctx, other);
+  orb_alignment_forget_landmarks(ctx, 0, other);
   return ORB_OK;
 }
 
@@ -271,7 +275,7 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
     ORB_GO(status, align_shapes(ctx, shapes, shape_count, landmarks, landmark_count, options, out), end);
   }
   ORB_GO(status, match_rims(ctx, shapes, options, out), end);
-  status = describe(ctx, shapes, landmarks, options, out);
+  status = describe(ctx, shapes, landmarks, landmark_count, options, out);
 end:
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);

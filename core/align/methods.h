@@ -13,9 +13,10 @@
  *            filled holes that correspond, which lie on each other afterwards
  *   find/    matches, without landmarks or in agreement with them; given landmarks that may be misplaced
  *            (find/suspects.h)
- *   given/   method.c: one method with the given landmarks, and the composed maps of an alignment; by_landmarks.c: two
- *            ways to align by landmarks, of which the better one wins; given.c: one of these, then soft landmarks are
- *            released, and copies are extended to their shapes
+ *   given/   method.c: one method with the given landmarks, and the composed maps of an alignment; part.c: landmarks
+ *            that hold a part of the other shape; by_landmarks.c: a part, or two ways to align by landmarks, of which
+ *            the better one wins; given.c: one of these, then soft landmarks are released, and copies are extended to
+ *            their shapes
  *   auto/    auto.c: method `auto`, the rotation search, composed towards the matches of find/; held.c: pairs of a
  *            match, held like landmarks
  *   align.c  orb_align(): checks the request, chooses between given/ and auto/, and aligns copies of large shapes
@@ -36,12 +37,15 @@ ORB_MUST_CHECK orb_status orb_align_by_method(orb_context *ctx, const orb_align_
                                               const orb_align_options *options, orb_alignment *out);
 
 /* Working copies in which the landmarks meet, by pins or by a match, with their maps composed. Soft landmarks are held
- * like the others. */
+ * like the others. If one of two shapes is found to be a part of the other one, `out` has more landmarks than were
+ * given: what is held for the part comes after them, until the caller forgets it
+ * (orb_alignment_forget_landmarks()). */
 ORB_MUST_CHECK orb_status orb_align_by_landmarks(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                                  const orb_landmark *landmarks, int32_t landmark_count,
                                                  const orb_align_options *options, orb_alignment *out);
 
-/* orb_align() for one method with the given landmarks; `auto` without landmarks is the rotation search here. */
+/* orb_align() for one method with the given landmarks; `auto` without landmarks is the rotation search here. `out` may
+ * have more landmarks, as above. */
 ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                           const orb_landmark *landmarks, int32_t landmark_count,
                                           const orb_align_options *options, orb_alignment *out);
@@ -92,11 +96,13 @@ ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape
                                          const orb_align_options *options, orb_alignment *out);
 
 /* Extends an alignment of copies to the whole shapes. landmarks: the caller's, on the given meshes. The maps of the
- * copies are refined, soft landmarks are held by their springs, and what is held for a part stays held. The
+ * copies are refined, soft landmarks are held by their springs, and what is held for a part, after the caller's
+ * landmarks, stays held. The
  * alternatives become places on the given meshes. *lifted 0: a map folds at the level of its copy, and `alignment` is
  * empty. `copies` is used up in any case; the caller frees it. */
 ORB_MUST_CHECK orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks,
-                                         orb_preset preset, orb_alignment *alignment, int *lifted);
+                                         int32_t landmark_count, orb_preset preset, orb_alignment *alignment,
+                                         int *lifted);
 
 /* Do rotations alone make the spheres of an alignment correspond? Then areas say more than angles, and the shapes keep
  * their spheres. O(n). */

@@ -54,7 +54,8 @@ def generated_pairs(options, folder):
     for name in [pair for pair in options.pairs if "+" in pair] if options.pairs else GENERATED:
         bodies = name.split("+")
         for body in bodies:
-            subprocess.run([options.bin / "orbmorph-posed", folder, body], check=True, stdout=subprocess.DEVNULL)
+            if subprocess.run([options.bin / "orbmorph-posed", folder, body], stdout=subprocess.DEVNULL).returncode:
+                sys.exit(f"{name}: there is no body {body}")
         yield "-".join(bodies), [folder / f"{body}.obj" for body in bodies], ["--align", "auto"]
 
 
@@ -86,8 +87,8 @@ def main():
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     refused, rows = 0, []
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
+    with tempfile.TemporaryDirectory() as made:
+        folder = pathlib.Path(made)
         for pairs in real_pairs, generated_pairs:
             for name, meshes, how in pairs(options, folder):
                 run = draw(options, folder, name, meshes, how)

@@ -248,44 +248,95 @@ static int32_t vertex_towards(const orb_mesh *mesh, const double to[3]) {
   return best;
 }
 
+/* Where a landmark is, as a direction from the middle of the head of each shape. */
+typedef struct given {
+  double to[2][3], weight;
+} given;
+
+#define BOTH(...)    \
+  {                  \
+    {__VA_ARGS__}, { \
+      __VA_ARGS__    \
+    }                \
+  }
+
+/* Aligns the head (the first shape if `head` is 0) and the bust by landmarks. Returns how far the head is off. */
+static double off_with(int head, const given *all, int count, orb_preset preset) {
+  enum { MOST = 8 };
+  scene s = {.mesh = {shape_of(head, 4, 1), shape_of(!head, 4, 1)}};
+  orb_mesh ball = shape_ball(ctx, 4);
+  const orb_align_shape shape[2] = {{&s.mesh[0], ball.positions}, {&s.mesh[1], ball.positions}};
+  orb_place at[MOST][2];
+  orb_landmark landmark[MOST];
+  orb_align_options options;
+  orb_alignment out;
+  for (int i = 0; i < count; i++) {
+    landmark[i] = (orb_landmark){.at = at[i], .weight = all[i].weight};
+    for (int k = 0; k < 2; k++) {
+      const int32_t v = vertex_towards(&s.mesh[k], all[i].to[k]);
+      assert_int_equal(orb_place_of_vertex(ctx, &s.mesh[k], v, &at[i][k]), ORB_OK);
+    }
+  }
+  orb_align_defaults(&options);
+  options.preset = preset;
+  assert_int_equal(orb_align(ctx, shape, 2, landmark, count, &options, &out), ORB_OK);
+  assert_true(out.shapes[0].certificate.valid && out.shapes[1].certificate.valid);
+  assert_int_equal(out.landmark_count, count);
+  const int32_t *v[2] = {out.shapes[0].landmark_vertices, out.shapes[1].landmark_vertices};
+  for (int i = 0; i < count && all[i].weight == 0; i++) {
+    assert_memory_equal(out.shapes[0].points + 3 * (size_t)v[0][i], out.shapes[1].points + 3 * (size_t)v[1][i],
+                        3 * sizeof(double));
+  }
+  const double off = off_the_head(&s, head, 4, &out);
+  orb_alignment_free(ctx, &out);
+  shape_free(ctx, &ball);
+  scene_close(&s);
+  return off;
+}
+
 /* With landmarks on the nose, the ears, the bun, the top and the neck, or with the first of them alone, the head lies
  * on the head of the bust, whichever comes first: it moves in both orders. A third of its radius is allowed, two edges.
  */
 static void landmarks_lay_the_head_onto_the_bust(void **state) {
   (void)state;
-  enum { LANDMARKS = 8, CASES = 5 };
-  static const double to[LANDMARKS][3] = {{1, 0, 0}, {0, 0.98, 0.2}, {0, -0.98, 0.2},    {-0.8, 0, 0.6},
-                                          {0, 0, 1}, {0.6, 0, -0.8}, {-0.6, 0.5, -0.62}, {-0.6, -0.5, -0.62}};
-  static const int head_of[CASES] = {0, 1, 0, 1, 0}, count_of[CASES] = {1, 1, 3, 4, 8};
-  for (int n = 0; n < CASES; n++) {
-    const int head = head_of[n], count = count_of[n];
-    scene s = {.mesh = {shape_of(head, 4, 1), shape_of(!head, 4, 1)}};
-    orb_mesh ball = shape_ball(ctx, 4);
-    const orb_align_shape shape[2] = {{&s.mesh[0], ball.positions}, {&s.mesh[1], ball.positions}};
-    orb_place at[LANDMARKS][2];
-    orb_landmark landmark[LANDMARKS];
-    orb_align_options options;
-    orb_alignment out;
-    for (int i = 0; i < count; i++) {
-      landmark[i] = (orb_landmark){.at = at[i]};
-      for (int k = 0; k < 2; k++) {
-        assert_int_equal(orb_place_of_vertex(ctx, &s.mesh[k], vertex_towards(&s.mesh[k], to[i]), &at[i][k]), ORB_OK);
-      }
-    }
-    orb_align_defaults(&options);
-    assert_int_equal(orb_align(ctx, shape, 2, landmark, count, &options, &out), ORB_OK);
-    assert_true(out.shapes[0].certificate.valid && out.shapes[1].certificate.valid);
-    assert_true(off_the_head(&s, head, 4, &out) < 0.3);
-    assert_int_equal(out.landmark_count, count);
-    for (int i = 0; i < count; i++) {
-      const int32_t *v[2] = {out.shapes[0].landmark_vertices, out.shapes[1].landmark_vertices};
-      assert_memory_equal(out.shapes[0].points + 3 * (size_t)v[0][i], out.shapes[1].points + 3 * (size_t)v[1][i],
-                          3 * sizeof(double));
-    }
-    orb_alignment_free(ctx, &out);
-    shape_free(ctx, &ball);
-    scene_close(&s);
-  }
+  static const given all[] = {{BOTH(1, 0, 0), 0},          {BOTH(0, 0.98, 0.2), 0},     {BOTH(0, -0.98, 0.2), 0},
+                              {BOTH(-0.8, 0, 0.6), 0},     {BOTH(0, 0, 1), 0},          {BOTH(0.6, 0, -0.8), 0},
+                              {BOTH(-0.6, 0.5, -0.62), 0}, {BOTH(-0.6, -0.5, -0.62), 0}};
+  assert_true(off_with(0, all, 1, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(off_with(1, all, 1, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(off_with(0, all, 3, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(off_with(1, all, 4, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(off_with(0, all, 8, ORB_PRESET_DEFAULT) < 0.3);
+}
+
+/* The preset `quality` looks for a part too. */
+static void quality_lays_the_head_onto_the_bust(void **state) {
+  (void)state;
+  static const given nose = {BOTH(1, 0, 0), 0};
+  assert_true(off_with(0, &nose, 1, ORB_PRESET_QUALITY) < 0.3);
+}
+
+/* Landmarks in a row, or all at one place, leave the turn of the part open. */
+static void landmarks_in_a_row_fix_no_turn(void **state) {
+  (void)state;
+  static const given row[] = {{BOTH(1, 0, 0), 0}, {BOTH(0.9, 0.3, 0.3), 0}, {BOTH(0.9, -0.3, -0.3), 0}};
+  static const given same[] = {{BOTH(0, 0.98, 0.2), 0}, {BOTH(0, 0.98, 0.2), 0}, {BOTH(0, 0.98, 0.2), 0}};
+  assert_true(off_with(0, row, 3, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(off_with(0, same, 3, ORB_PRESET_DEFAULT) < 0.3);
+}
+
+/* What is held for the part stays held when a soft landmark is let go; and a soft one that is wrong excludes no part.
+ */
+static void soft_landmarks_keep_the_part(void **state) {
+  (void)state;
+  static const given soft = {BOTH(1, 0, 0), 0.5};
+  static const given wrong[] = {{BOTH(1, 0, 0), 0},
+                                {BOTH(0, 0.98, 0.2), 0},
+                                {BOTH(0, -0.98, 0.2), 0},
+                                {BOTH(-0.8, 0, 0.6), 0},
+                                {{{0, 0, 1}, {0.5, 0.71, 0.5}}, 0.1}};
+  assert_true(off_with(0, &soft, 1, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(off_with(0, wrong, 5, ORB_PRESET_DEFAULT) < 0.5); /* it draws what is near it */
 }
 
 /* A landmark says that the nose of the head is the foot of the bust, where no part takes it. It is kept. */
@@ -309,6 +360,8 @@ static void landmark_excludes_the_part(void **state) {
   assert_int_equal(orb_align(ctx, shape, 2, &landmark, 1, &options, &out), ORB_OK);
   assert_true(out.shapes[0].certificate.valid && out.shapes[1].certificate.valid);
   assert_true(off_the_head(&s, 0, 4, &out) > 1);
+  assert_memory_equal(out.shapes[0].points + 3 * (size_t)out.shapes[0].landmark_vertices[0],
+                      out.shapes[1].points + 3 * (size_t)out.shapes[1].landmark_vertices[0], 3 * sizeof(double));
   orb_alignment_free(ctx, &out);
   shape_free(ctx, &ball);
   scene_close(&s);
@@ -388,6 +441,9 @@ int main(void) {
                                      cmocka_unit_test(body_without_its_limbs_is_no_part),
                                      cmocka_unit_test(head_goes_to_the_head),
                                      cmocka_unit_test(landmarks_lay_the_head_onto_the_bust),
+                                     cmocka_unit_test(quality_lays_the_head_onto_the_bust),
+                                     cmocka_unit_test(landmarks_in_a_row_fix_no_turn),
+                                     cmocka_unit_test(soft_landmarks_keep_the_part),
                                      cmocka_unit_test(landmark_excludes_the_part),
                                      cmocka_unit_test(threads_change_nothing),
                                      cmocka_unit_test(memory_runs_out)};

@@ -54,7 +54,7 @@ orb_status orb_align_held(orb_context *ctx, const orb_align_shape *shapes, int32
     goto end;
   }
   if (!for_good) {
-    orb_alignment_forget_landmarks(ctx, out);
+    orb_alignment_forget_landmarks(ctx, 0, out);
     ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, options->preset), end);
   }
   *held = 1;

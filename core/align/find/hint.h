@@ -13,6 +13,7 @@ typedef struct orb_match_hint {
   const int32_t *first, *second;
   double stretch; /* orb_hint_stretch() above which no match is looked for */
   double sure;    /* orb_hint_stretch() up to which a match is taken; between the two, its bend decides */
+  int seeks_part; /* whether one of two shapes is a part of the other one is looked for too */
 } orb_match_hint;
 
 /* The hint on scaled coarse copies of the shapes. */

@@ -240,8 +240,8 @@ end:
 }
 
 /* Landmarks exclude that the shapes are one body; one may be a part of the other one. */
-static orb_status give_up(orb_trials *t, int walks, orb_match *out) {
-  if (!walks || !orb_inset_is_possible(t)) {
+static orb_status give_up(orb_trials *t, int seeks, orb_match *out) {
+  if (!seeks || !orb_inset_is_possible(t)) {
     return ORB_OK;
   }
   ORB_TRY(orb_trials_survey(t, 0));
@@ -259,10 +259,11 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->is_unlike = stretch > ORB_FIND_HINT_STRETCH_MOST;
   out->walks_above = out->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
   if (hint && stretch > hint->stretch) {
-    return give_up(t, walks, out);
+    return give_up(t, hint->seeks_part, out);
   }
-  const int seeks =
-      walks && !out->is_unlike && orb_inset_is_possible(t); /* of unlike ones, give_up() has looked for a part */
+  const int may_be =
+      hint ? hint->seeks_part && !out->is_unlike : walks; /* of unlike ones, give_up() has looked for it */
+  const int seeks = may_be && orb_inset_is_possible(t);
   double bend = INFINITY;
   if (!out->is_unlike) { /* the trial that landmarks make would bend unlike shapes too much */
     ORB_TRY(orb_trials_try_hinted(t, &bend));
@@ -276,7 +277,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   }
   int32_t best = orb_trials_best(t);
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
-    return seeks ? orb_inset_find(t, &out->inset) : ORB_OK;
+    return seeks && hint ? orb_inset_find(t, &out->inset) : ORB_OK;
   }
   out->is_unsure = !suits_hint(&t->trial[best], hint, stretch);
   if (out->is_unsure) {
@@ -288,6 +289,9 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   ORB_TRY(write_ranking(t, out));
   if (seeks && out->bend > ORB_FIND_INSET_BENDS) {
     ORB_TRY(orb_inset_find(t, &out->inset));
+  }
+  if (hint && out->inset.count > 0) { /* nothing settles on the map */
+    return ORB_OK;
   }
   return orb_trials_refine(t, walks && out->bend > out->walks_above ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
 }

@@ -77,8 +77,8 @@ typedef struct orb_match {
   orb_match_pairs pairs;
   int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
   orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
-  orb_inset inset;    /* whether one shape is a part of the other one; only searched if `walks`, with few landmarks, and
-                         if the shapes bend or landmarks exclude that they are one body. Filled without a map too */
+  orb_inset inset;    /* whether one shape is a part of the other one; only searched if `walks` or the hint says so, and
+                         if the shapes bend, or landmarks exclude a match. With a hint, the map is then not finished */
   double *target;     /* the caller's to set, with orb_match_target() or orb_match_aim(); freed with the match */
   orb_trials *trials; /* the candidates, for the functions below */
 } orb_match;
@@ -86,9 +86,9 @@ typedef struct orb_match {
 /* hint: NULL, or landmarks. With landmarks, a match is found only if the shapes are as much alike as the hint demands.
  * Only maps that take the first few landmarks near their partners count; the targets
  * then take all landmarks there. walks: landmark walks lead to the map of shapes that bend much; they need samples of
- * the targets only, so these come from coarser copies; and two shapes that bend are searched for a part, which takes
- * another 0.1 s. Free `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on all threads, and
- * the result has the same bytes for any number of them. */
+ * the targets only, so these come from coarser copies; and without landmarks two shapes that bend are searched for a
+ * part, which takes another 0.1 s. Free `out` in any case. About 0.5 s of one thread, whatever the size. Trials run on
+ * all threads, and the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, int walks, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by

@@ -1,4 +1,5 @@
-/* Alignment by landmarks. Two ways compete: pins (pin/), and a match (find/match.c) that the landmarks draw to their
+/* Alignment by landmarks. If one of two shapes is a part of the other one, what lies on each other is held. Otherwise
+ * two ways compete: pins (pin/), and a match (find/match.c) that the landmarks draw to their
  * partners. Whichever leads to the better map wins. One body in two poses has its limbs where a match has them. Shapes
  * of other kinds take the match as a guide, if pins alone lead to no map or to a poor one. */
 #include <math.h>
@@ -85,7 +86,7 @@ typedef struct two_ways {
   int has_tried_pins, lacks_room;
   int fits_part;   /* that map is drawn to where parts of the shapes fit, so its energy does not compare */
   int walked;      /* the pins of two shapes meet in a map that a landmark walk has led to */
-  int seeks_part;  /* one of two shapes may be a part of the other one */
+  int seeks_part;  /* look whether one of two shapes is a part of the other one */
   orb_inset inset; /* it is: there is nothing else to try then */
 } two_ways;
 
@@ -201,7 +202,8 @@ static orb_status find_posed(orb_context *ctx, const posing *all, int32_t s, int
                                .first = vertex[0],
                                .second = vertex[1],
                                .stretch = fmax(ORB_FIND_HINT_STRETCH_MOST, all->sure),
-                               .sure = all->sure};
+                               .sure = all->sure,
+                               .seeks_part = c->seeks_part && c->shape_count == 2};
   status = orb_match_find(ctx, &a->shapes[0].mesh, &a->shapes[s].mesh, &hint, walks, match);
 done:
   orb_free(ctx, vertex[0]);
@@ -369,6 +371,9 @@ static orb_status improve(two_ways *c) {
     return ORB_OK;
   }
   ORB_TRY(try_pose_again(c));
+  if (c->inset.count > 0) {
+    return ORB_OK;
+  }
   const int is_done = p->is_found ? ends_right(c) : c->walked || c->loose <= good;
   if (is_done) {
     keep_better(c);
@@ -426,23 +431,22 @@ static orb_status align_two_ways(orb_context *ctx, const orb_align_shape *shapes
   return status;
 }
 
-/* Aligns a part and its whole: what lies on each other in space is held beside the landmarks. A map of least energy
+/* Aligns a part and its whole: what lies on each other in space is held, after the landmarks. A map of least energy
  * would spread the part over the whole. `out` stays empty if the pairs cannot be met, or if their map is bad. */
 static orb_status align_part(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                              int32_t landmark_count, const orb_align_options *options, const orb_inset *inset,
                              orb_alignment *out) {
+  orb_align_options pin = *options;
   orb_part_landmarks all;
   orb_status status;
+  pin.max_growth = 1e-9; /* practically none: pairs that were found are not worth splits */
   ORB_GO(status, orb_part_landmarks_create(ctx, shapes, landmarks, landmark_count, inset, &all), end);
   if (all.count > landmark_count) {
-    status = align_two_ways(ctx, shapes, 2, all.landmark, all.count, options, NULL, out);
+    status = align_two_ways(ctx, shapes, 2, all.landmark, all.count, &pin, NULL, out);
     status = orb_alignment_lacks_room(ctx, status) ? ORB_OK : status;
   }
   if (out->shapes && !(out->energy <= ORB_FIND_INSET_MOST_ENERGY)) {
     orb_alignment_free(ctx, out);
-  }
-  if (out->shapes) {
-    out->landmark_count = landmark_count; /* forgets the pairs, which come last */
   }
 end:
   orb_part_landmarks_free(ctx, &all);

@@ -47,9 +47,11 @@ static void free_landmarks(const orb_landmark *landmarks, int32_t count, orb_ali
 }
 
 /* Soft landmarks say where to look, not where to end. They were pinned with the others, so that the map takes each limb
- * to its limb. Now the map is composed once more with them free, and a spring pulls the places of each together. */
-static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, orb_preset preset, orb_alignment *alignment) {
-  const int32_t count = alignment->landmark_count, soft = orb_landmarks_soft(landmarks, count);
+ * to its limb. Now the map is composed once more with them free, and a spring pulls the places of each together. What
+ * is held for a part, after these landmarks, stays held. */
+static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, int32_t count, orb_preset preset,
+                         orb_alignment *alignment) {
+  const int32_t soft = orb_landmarks_soft(landmarks, count);
   if (soft == 0 || alignment->shape_count < 2) {
     return ORB_OK;
   }
@@ -63,7 +65,8 @@ static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, orb_pr
                 &guide.springs);
     free_landmarks(landmarks, count, &alignment->shapes[s]);
     ORB_GO(status,
-           orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], 0, count, &guide, preset, energy, &improved),
+           orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], 0, alignment->landmark_count, &guide, preset,
+                       energy, &improved),
            end);
     sum += energy[1];
   }
@@ -90,7 +93,7 @@ static orb_status align_and_compose(orb_context *ctx, const orb_align_shape *sha
     }
   }
   if (status == ORB_OK) {
-    status = soften(ctx, landmarks, options->preset, out);
+    status = soften(ctx, landmarks, landmark_count, options->preset, out);
   }
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
@@ -112,9 +115,8 @@ orb_status orb_align_pinned(orb_context *ctx, const orb_align_shape *shapes, int
 
 /* Refines the map of the copy of shape s, and replaces the copy by the whole shape. *energy: INFINITY if there is no
  * map; both shapes then stay as they are. */
-static orb_status lift_shape(orb_context *ctx, orb_copied_shape *copied, const orb_landmark *landmarks, int32_t s,
-                             orb_preset preset, orb_alignment *alignment, double *energy) {
-  const int32_t count = alignment->landmark_count;
+static orb_status lift_shape(orb_context *ctx, orb_copied_shape *copied, const orb_landmark *landmarks, int32_t count,
+                             int32_t s, orb_preset preset, orb_alignment *alignment, double *energy) {
   orb_aligned_shape *fixed = &alignment->shapes[0], *whole = &copied->whole;
   orb_map_guide guide = {.from = ORB_MAP_FROM_COPY,
                          .fits_parts = 1,
@@ -126,7 +128,8 @@ static orb_status lift_shape(orb_context *ctx, orb_copied_shape *copied, const o
   ORB_GO(status, springs_create(ctx, orb_landmarks_soft(landmarks, count), &guide.springs), end);
   set_springs(landmarks, count, fixed->landmark_vertices, whole->landmark_vertices, &guide.springs);
   free_landmarks(landmarks, count, whole);
-  ORB_GO(status, orb_compose(ctx, fixed, whole, 0, count, &guide, preset, energies, &improved), end);
+  ORB_GO(status, orb_compose(ctx, fixed, whole, 0, alignment->landmark_count, &guide, preset, energies, &improved),
+         end);
   *energy = improved ? energies[1] : INFINITY;
   if (improved) {
     orb_aligned_shape_free(ctx, &alignment->shapes[s]);
@@ -150,8 +153,9 @@ static orb_status lift_alternatives(orb_context *ctx, const orb_copies *copies, 
   return ORB_OK;
 }
 
-/* What is held for a part is at vertices of the copies. Holds it at the same vertices of the whole shapes. */
-static orb_status lift_held(orb_context *ctx, orb_copies *copies, const orb_alignment *alignment) {
+/* What is held for a part, after the `count` given landmarks, is at vertices of the copies. Holds it at the same
+ * vertices of the whole shapes, which have the given ones. */
+static orb_status lift_held(orb_context *ctx, orb_copies *copies, int32_t count, const orb_alignment *alignment) {
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     orb_copied_shape *one = &copies->of[s];
     int32_t *vertex = ORB_NEW(ctx, int32_t, alignment->landmark_count);
@@ -159,7 +163,8 @@ static orb_status lift_held(orb_context *ctx, orb_copies *copies, const orb_alig
       return ORB_E_NO_MEMORY;
     }
     for (int32_t l = 0; l < alignment->landmark_count; l++) {
-      vertex[l] = one->copy.vertex[alignment->shapes[s].landmark_vertices[l]];
+      vertex[l] =
+          l < count ? one->whole.landmark_vertices[l] : one->copy.vertex[alignment->shapes[s].landmark_vertices[l]];
     }
     orb_free(ctx, one->whole.landmark_vertices);
     one->whole.landmark_vertices = vertex;
@@ -167,23 +172,21 @@ static orb_status lift_held(orb_context *ctx, orb_copies *copies, const orb_alig
   return ORB_OK;
 }
 
-orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, orb_preset preset,
-                          orb_alignment *alignment, int *lifted) {
-  const orb_landmark none_soft[ORB_FIND_INSET_PAIRS] = {0};
+orb_status orb_align_lift(orb_context *ctx, orb_copies *copies, const orb_landmark *landmarks, int32_t landmark_count,
+                          orb_preset preset, orb_alignment *alignment, int *lifted) {
   double sum = 0;
   orb_status status;
   *lifted = 0;
   ORB_GO(status, lift_alternatives(ctx, copies, alignment), end);
-  if (alignment->match.is_part) {
-    landmarks = none_soft;
-    ORB_GO(status, lift_held(ctx, copies, alignment), end);
+  if (alignment->landmark_count > landmark_count) {
+    ORB_GO(status, lift_held(ctx, copies, landmark_count, alignment), end);
   }
   for (int32_t s = 1; s < alignment->shape_count && sum < INFINITY; s++) {
     double energy = INFINITY;
-    ORB_GO(status, lift_shape(ctx, &copies->of[s], landmarks, s, preset, alignment, &energy), end);
+    ORB_GO(status, lift_shape(ctx, &copies->of[s], landmarks, landmark_count, s, preset, alignment, &energy), end);
     sum += energy;
   }
-  free_landmarks(landmarks, alignment->landmark_count, &alignment->shapes[0]);
+  free_landmarks(landmarks, landmark_count, &alignment->shapes[0]);
   alignment->energy = sum / (alignment->shape_count - 1);
   *lifted = sum < INFINITY;
 end:

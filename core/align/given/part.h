@@ -17,7 +17,7 @@ typedef struct orb_part_landmarks {
 
 /* Leaves out pairs that lie near a landmark on either shape, or at a vertex that a shape does not have: those of the
  * inset are on copies that may have more. out->count is landmark_count if the rest is too few to hold a part. Free
- * `out` in any case. O(landmarks · pairs + n). */
+ * `out` in any case. O(pairs · n). */
 ORB_MUST_CHECK orb_status orb_part_landmarks_create(orb_context *ctx, const orb_align_shape shapes[2],
                                                     const orb_landmark *landmarks, int32_t landmark_count,
                                                     const orb_inset *inset, orb_part_landmarks *out);

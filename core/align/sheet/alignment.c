@@ -40,9 +40,9 @@ void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignme
   memset(other, 0, sizeof *other);
 }
 
-void orb_alignment_forget_landmarks(orb_context *ctx, orb_alignment *alignment) {
-  alignment->landmark_count = 0;
-  for (int32_t s = 0; s < alignment->shape_count; s++) {
+void orb_alignment_forget_landmarks(orb_context *ctx, int32_t kept, orb_alignment *alignment) {
+  alignment->landmark_count = kept;
+  for (int32_t s = 0; s < alignment->shape_count && kept == 0; s++) {
     orb_free(ctx, alignment->shapes[s].landmark_vertices);
     alignment->shapes[s].landmark_vertices = NULL;
   }

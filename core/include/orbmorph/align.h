@@ -25,8 +25,9 @@ ORB_API void orb_align_defaults(orb_align_options *options);
  *   would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's points or at
  *   new ones. With any preset but fast, if four landmarks or more show that the shapes are one body in several poses
  *   and matching them leads to a good map, nothing is embedded with constraints: the landmarks meet at the first
- *   shape's points, and max_growth has no effect. After pin and rbf the vertices of a landmark have bit-equal points on
- *   all shapes.
+ *   shape's points, and max_growth has no effect. If one of two shapes is a part of the other one, as a head is of a
+ *   bust, and up to sixteen landmarks agree with that, what lies on each other in space is held beside them. After pin
+ * and rbf the vertices of a landmark have bit-equal points on all shapes.
  * - auto: pin if there are landmarks. Without landmarks, auto first searches for rotations, then matches each later
  *   shape with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both
  *   shapes least. The composed map sends each vertex to where the match takes it. The preset fast only searches for

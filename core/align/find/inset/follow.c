@@ -106,6 +106,30 @@ static int keeps_landmarks(const orb_inset_pair *c, const orb_similarity *at) {
   return 1;
 }
 
+/* Are points far apart, and not in a row? */
+static int fix_turn(const double *at, int32_t count) {
+  double far[3] = {0}, most = 0, beside = 0;
+  for (int32_t i = 1; i < count; i++) { /* from the first of them: a half of what is farthest, or more */
+    double way[3];
+    orb_sub(at + 3 * (size_t)i, at, way);
+    if (orb_length(way) > most) {
+      most = orb_length(way);
+      memcpy(far, way, sizeof far);
+    }
+  }
+  for (int32_t i = 1; i < count && most > 0; i++) {
+    double way[3], across[3];
+    orb_sub(at + 3 * (size_t)i, at, way);
+    orb_cross(far, way, across);
+    beside = fmax(beside, orb_length(across) / most);
+  }
+  return most > ORB_FIND_INSET_SPREAD && beside > ORB_FIND_INSET_BESIDE * most;
+}
+
+int orb_inset_is_fixed(const orb_inset_pair *c) {
+  return fix_turn(c->landmark[0], c->landmark_count) && fix_turn(c->landmark[1], c->landmark_count);
+}
+
 int orb_inset_fit(const orb_inset_pair *c, orb_similarity *out) {
   orb_similarity_sums sums = {0};
   for (size_t i = 0; i < (size_t)c->landmark_count; i++) {

@@ -15,6 +15,8 @@ typedef struct orb_inset_pair {
   const double *landmark[2]; /* on the small shape and on the large one, 3 each */
 } orb_inset_pair;
 
+/* Do the landmarks, which alone are needed, fix a similarity: are they apart on both shapes, and not in a row? */
+int orb_inset_is_fixed(const orb_inset_pair *pair);
 /* The similarity of the landmarks, which alone are needed. Returns 0 if it is not that of a part. */
 int orb_inset_fit(const orb_inset_pair *pair, orb_similarity *out);
 

@@ -121,31 +121,32 @@ end:
   return status;
 }
 
+/* Soft landmarks exclude nothing, if there are enough others. */
 static void set_landmarks(const orb_trials *t, int large, orb_inset_pair *out) {
-  out->landmark_count = t->hint.count;
+  out->landmark_count = t->hint.trusted;
   out->landmark[0] = t->hint.at[1 - large];
   out->landmark[1] = t->hint.at[large];
 }
 
 int orb_inset_is_possible(const orb_trials *t) {
-  for (int large = 0; large < 2 && t->hint.count >= ORB_FIND_INSET_FITTED; large++) {
+  int is_fixed = 0, fits = 0;
+  for (int large = 0; large < 2; large++) {
     orb_inset_pair pair;
     orb_similarity at;
     set_landmarks(t, large, &pair);
-    if (orb_inset_fit(&pair, &at)) {
-      return t->hint.count <= ORB_FIND_INSET_LANDMARKS;
-    }
+    is_fixed = orb_inset_is_fixed(&pair);
+    fits |= is_fixed && orb_inset_fit(&pair, &at);
   }
-  return t->hint.count < ORB_FIND_INSET_FITTED;
+  return t->hint.trusted <= ORB_FIND_INSET_LANDMARKS && (fits || !is_fixed);
 }
 
-/* Where the part may lie: at the similarity of three landmarks or more; or else where the middle of the landmarks
- * meets, or anywhere. start: room for 2 · ORB_INSET_STARTS. */
+/* Where the part may lie: at the similarity of landmarks that fix one; or else where the middle of the landmarks meets,
+ * and anywhere. start: room for 2 · ORB_INSET_STARTS. */
 static orb_status write_starts(orb_context *ctx, const search *c, const orb_inset_pair *pair, orb_similarity *start,
                                int32_t *count) {
   const int32_t landmarks = pair->landmark_count;
-  *count = landmarks >= ORB_FIND_INSET_FITTED && orb_inset_fit(pair, start);
-  if (*count == 1) {
+  if (orb_inset_is_fixed(pair)) {
+    *count = orb_inset_fit(pair, start);
     return ORB_OK;
   }
   ORB_TRY(orb_inset_starts(ctx, &c->grid, pair->sample, start, count));
@@ -184,7 +185,7 @@ static orb_status look(orb_context *ctx, void *arg, int32_t i) {
   orb_inset_pair pair = {
       .sample = sample, .sample_count = c->sample_count, .large = c->whole, .tree = c->tree[1], .grid = &c->grid};
   set_landmarks(c->trials, c->large, &pair);
-  if (pair.landmark_count >= ORB_FIND_INSET_FITTED && !orb_inset_fit(&pair, start)) {
+  if (orb_inset_is_fixed(&pair) && !orb_inset_fit(&pair, start)) { /* without a grid */
     return ORB_OK;
   }
   ORB_TRY(orb_inset_grid_create(ctx, c->whole, c->tree[1], &c->grid));

@@ -1,10 +1,10 @@
 /* Whether one of two shapes is a part of the other one, as a head is of a bust.
  *
- * In: coarse copies of two shapes, scaled to one area. Out: pairs of vertices of the part that correspond. A map of
- * least energy spreads a part over the whole, since it stretches all places alike, and it bends the copies little; so
- * neither energy nor bend tells that it is wrong. Space does: at another size, most of the part lies on the surface of
- * the whole, and what it leaves uncovered is one piece. If the torso of a horse lies on that of a cow, the limbs are
- * uncovered, which are many.
+ * In: coarse copies of two shapes, scaled to one area, and perhaps landmarks on them. Out: pairs of vertices of the
+ * part that correspond. A map of least energy spreads a part over the whole, since it stretches all places alike, and
+ * it bends the copies little; so neither energy nor bend tells that it is wrong. Space does: at another size, most of
+ * the part lies on the surface of the whole, and what it leaves uncovered is one piece. If the torso of a horse lies on
+ * that of a cow, the limbs are uncovered, which are many.
  *
  * Of many places, turns and sizes, the best by a grid of distances (grid.h, starts.h) follow closest points (follow.h;
  * Besl & McKay 1992) with a scale (Umeyama 1991). Points that are apart or face other ways count less. */
@@ -26,7 +26,8 @@ typedef struct orb_inset {
  * themselves (map/space/part.h)? trials: opened. O(landmarks). */
 int orb_inset_is_possible(const orb_trials *trials);
 
-/* trials: opened and surveyed. A part that takes a landmark far from its partner is none. About 0.1 s of one thread, on
+/* trials: opened and surveyed. A part that takes a landmark far from its partner is none; soft landmarks do not count,
+ * if there are enough others. About 0.1 s of one thread, on
  * two threads if there are two. */
 ORB_MUST_CHECK orb_status orb_inset_find(const orb_trials *trials, orb_inset *out);
 
