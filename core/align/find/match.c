@@ -261,8 +261,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   if (hint && stretch > hint->stretch) {
     return give_up(t, hint->seeks_part, out);
   }
-  const int may_be =
-      hint ? hint->seeks_part && !out->is_unlike : walks; /* of unlike ones, give_up() has looked for it */
+  const int may_be = hint ? hint->seeks_part && !out->is_unlike : walks; /* for unlike ones, give_up() looks */
   const int seeks = may_be && orb_inset_is_possible(t);
   double bend = INFINITY;
   if (!out->is_unlike) { /* the trial that landmarks make would bend unlike shapes too much */

@@ -1,7 +1,7 @@
 /* Alignment by landmarks. If one of two shapes is a part of the other one, what lies on each other is held. Otherwise
- * two ways compete: pins (pin/), and a match (find/match.c) that the landmarks draw to their
- * partners. Whichever leads to the better map wins. One body in two poses has its limbs where a match has them. Shapes
- * of other kinds take the match as a guide, if pins alone lead to no map or to a poor one. */
+ * two ways compete: pins (pin/), and a match (find/match.c) that the landmarks draw to their partners. Whichever leads
+ * to the better map wins. One body in two poses has its limbs where a match has them. Shapes of other kinds take the
+ * match as a guide, if pins alone lead to no map or to a poor one. */
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
