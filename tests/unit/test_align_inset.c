@@ -20,6 +20,13 @@
  * bottom. */
 static const double NECK = 0.85 * M_PI, OF_HEAD = 0.9, OF_BUST = 0.45;
 
+/* With sanitizers an alignment takes a quarter of a minute, so some cases are left out. */
+#ifdef __SANITIZE_ADDRESS__
+enum { IS_SLOW = 1 };
+#else
+enum { IS_SLOW = 0 };
+#endif
+
 /* The surface at a share of the way down, as radius and height: a ball, then the sole of a head, or shoulders. */
 static void profile(int is_bust, double down, double *radius, double *height) {
   static const double at[][2] = {{0, 0}, {0.9, -1.5}, {1.7, -1.9}, {2, -3.2}, {0, -3.3}}; /* shoulders, chest, sole */
@@ -204,11 +211,7 @@ static double off_the_head(const scene *s, int head, int levels, orb_alignment *
 static void head_goes_to_the_head(void **state) {
   (void)state;
   static const int level[3][2] = {{4, 4}, {4, 4}, {4, 6}};
-#ifdef __SANITIZE_ADDRESS__
-  const int cases = 1; /* all of them take eight minutes, and other tests lift shapes with sanitizers */
-#else
-  const int cases = 3;
-#endif
+  const int cases = IS_SLOW ? 1 : 3; /* all of them take eight minutes, and other tests lift shapes with sanitizers */
   for (int i = 0; i < cases; i++) {
     const int head = i == 1;
     scene s = {.mesh = {shape_of(head, level[i][0], 1), shape_of(!head, level[i][1], 1)}};
@@ -303,16 +306,21 @@ static void landmarks_lay_the_head_onto_the_bust(void **state) {
                               {BOTH(-0.8, 0, 0.6), 0},     {BOTH(0, 0, 1), 0},          {BOTH(0.6, 0, -0.8), 0},
                               {BOTH(-0.6, 0.5, -0.62), 0}, {BOTH(-0.6, -0.5, -0.62), 0}};
   assert_true(off_with(0, all, 1, ORB_PRESET_DEFAULT) < 0.3);
-  assert_true(off_with(1, all, 1, ORB_PRESET_DEFAULT) < 0.3);
-  assert_true(off_with(0, all, 3, ORB_PRESET_DEFAULT) < 0.3);
   assert_true(off_with(1, all, 4, ORB_PRESET_DEFAULT) < 0.3);
-  assert_true(off_with(0, all, 8, ORB_PRESET_DEFAULT) < 0.3);
+  if (!IS_SLOW) {
+    assert_true(off_with(1, all, 1, ORB_PRESET_DEFAULT) < 0.3);
+    assert_true(off_with(0, all, 3, ORB_PRESET_DEFAULT) < 0.3);
+    assert_true(off_with(0, all, 8, ORB_PRESET_DEFAULT) < 0.3);
+  }
 }
 
 /* The preset `quality` looks for a part too. */
 static void quality_lays_the_head_onto_the_bust(void **state) {
   (void)state;
   static const given nose = {BOTH(1, 0, 0), 0};
+  if (IS_SLOW) {
+    skip();
+  }
   assert_true(off_with(0, &nose, 1, ORB_PRESET_QUALITY) < 0.3);
 }
 
@@ -321,7 +329,7 @@ static void landmarks_in_a_row_fix_no_turn(void **state) {
   (void)state;
   static const given row[] = {{BOTH(1, 0, 0), 0}, {BOTH(0.9, 0.3, 0.3), 0}, {BOTH(0.9, -0.3, -0.3), 0}};
   static const given same[] = {{BOTH(0, 0.98, 0.2), 0}, {BOTH(0, 0.98, 0.2), 0}, {BOTH(0, 0.98, 0.2), 0}};
-  assert_true(off_with(0, row, 3, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(IS_SLOW || off_with(0, row, 3, ORB_PRESET_DEFAULT) < 0.3);
   assert_true(off_with(0, same, 3, ORB_PRESET_DEFAULT) < 0.3);
 }
 
@@ -335,7 +343,7 @@ static void soft_landmarks_keep_the_part(void **state) {
                                 {BOTH(0, -0.98, 0.2), 0},
                                 {BOTH(-0.8, 0, 0.6), 0},
                                 {{{0, 0, 1}, {0.5, 0.71, 0.5}}, 0.1}};
-  assert_true(off_with(0, &soft, 1, ORB_PRESET_DEFAULT) < 0.3);
+  assert_true(IS_SLOW || off_with(0, &soft, 1, ORB_PRESET_DEFAULT) < 0.3);
   assert_true(off_with(0, wrong, 5, ORB_PRESET_DEFAULT) < 0.5); /* it draws what is near it */
 }
 
