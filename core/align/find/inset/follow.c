@@ -141,7 +141,7 @@ int orb_inset_fit(const orb_inset_pair *c, orb_similarity *out) {
 
 orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *c, const orb_similarity *start, int32_t count,
                             orb_similarity *out, double *score) {
-  enum { ROOM = 2 * ORB_INSET_STARTS + ORB_FIND_INSET_TURNED * (1 + ORB_INSET_FINE_TURNS) };
+  enum { ROOM = ORB_INSET_STARTS_MOST + ORB_FIND_INSET_TURNED * (1 + ORB_INSET_FINE_TURNS) };
   orb_place near[ORB_FIND_INSET_SAMPLES];
   orb_status status = ORB_OK;
   tried *all = ORB_NEW(ctx, tried, ROOM);

@@ -20,7 +20,7 @@ int orb_inset_is_fixed(const orb_inset_pair *pair);
 /* The similarity of the landmarks, which alone are needed. Returns 0 if it is not that of a part. */
 int orb_inset_fit(const orb_inset_pair *pair, orb_similarity *out);
 
-/* Lets all starts, 2 · ORB_INSET_STARTS at most, follow closest points by the stages of ORB_FIND_INSET_STAGE. A place
+/* Lets all starts, ORB_INSET_STARTS_MOST at most, follow closest points by the stages of ORB_FIND_INSET_STAGE. A place
  * that takes a landmark far from its partner is left. *score: how well the samples lie on the large shape at last, 0 to
  * 1; 0: no start has led anywhere, and `out` is not set. */
 ORB_MUST_CHECK orb_status orb_inset_follow(orb_context *ctx, const orb_inset_pair *pair, const orb_similarity *start,

@@ -140,15 +140,10 @@ int orb_inset_is_possible(const orb_trials *t) {
   return t->hint.trusted <= ORB_FIND_INSET_LANDMARKS && (fits || !is_fixed);
 }
 
-/* Where the part may lie: at the similarity of landmarks that fix one; or else where the middle of the landmarks meets,
- * and anywhere. start: room for 2 · ORB_INSET_STARTS. */
-static orb_status write_starts(orb_context *ctx, const search *c, const orb_inset_pair *pair, orb_similarity *start,
-                               int32_t *count) {
+/* Where the part may lie if landmarks fix no similarity: anywhere, and where their middle meets. */
+static orb_status write_starts(orb_context *ctx, const search *c, const orb_inset_pair *pair,
+                               orb_similarity start[ORB_INSET_STARTS_MOST], int32_t *count) {
   const int32_t landmarks = pair->landmark_count;
-  if (orb_inset_is_fixed(pair)) {
-    *count = orb_inset_fit(pair, start);
-    return ORB_OK;
-  }
   ORB_TRY(orb_inset_starts(ctx, &c->grid, pair->sample, start, count));
   double middle[2][3] = {{0}};
   for (int32_t i = 0; i < 6 * landmarks; i++) {
@@ -171,9 +166,8 @@ static int is_body(const orb_mesh *copy) {
 static orb_status look(orb_context *ctx, void *arg, int32_t i) {
   search *c = (search *)arg + i;
   orb_inset_sample sample[ORB_FIND_INSET_SAMPLES];
-  orb_similarity start[2 * ORB_INSET_STARTS];
+  orb_similarity start[ORB_INSET_STARTS_MOST];
   double stray = 1;
-  int32_t count;
   ORB_TRY(search_create(ctx, c->trials, c));
   if (c->sample_count < ORB_FIND_INSET_LOOKUPS || !is_body(c->part) || !is_body(c->whole)) {
     return ORB_OK;
@@ -185,11 +179,15 @@ static orb_status look(orb_context *ctx, void *arg, int32_t i) {
   orb_inset_pair pair = {
       .sample = sample, .sample_count = c->sample_count, .large = c->whole, .tree = c->tree[1], .grid = &c->grid};
   set_landmarks(c->trials, c->large, &pair);
-  if (orb_inset_is_fixed(&pair) && !orb_inset_fit(&pair, start)) { /* without a grid */
+  const int is_fixed = orb_inset_is_fixed(&pair);
+  int32_t count = is_fixed && orb_inset_fit(&pair, start);
+  if (is_fixed && count == 0) {
     return ORB_OK;
   }
   ORB_TRY(orb_inset_grid_create(ctx, c->whole, c->tree[1], &c->grid));
-  ORB_TRY(write_starts(ctx, c, &pair, start, &count));
+  if (!is_fixed) {
+    ORB_TRY(write_starts(ctx, c, &pair, start, &count));
+  }
   ORB_TRY(orb_inset_follow(ctx, &pair, start, count, &c->at, &c->score));
   if (!(c->score > 0) || c->at.scale < ORB_FIND_INSET_SMALLEST || c->at.scale > ORB_FIND_INSET_LARGEST) {
     return ORB_OK;

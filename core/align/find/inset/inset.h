@@ -27,8 +27,7 @@ typedef struct orb_inset {
 int orb_inset_is_possible(const orb_trials *trials);
 
 /* trials: opened and surveyed. A part that takes a landmark far from its partner is none; soft landmarks do not count,
- * if there are enough others. About 0.1 s of one thread, on
- * two threads if there are two. */
+ * if there are enough others. About 0.1 s of one thread, on two threads if there are two. */
 ORB_MUST_CHECK orb_status orb_inset_find(const orb_trials *trials, orb_inset *out);
 
 #endif

@@ -9,7 +9,8 @@
 enum {
   ORB_INSET_TURNS = 60, /* rotations that take a dodecahedron to itself: any rotation is within 45° of one of them */
   ORB_INSET_FINE_TURNS = 5 * ORB_INSET_TURNS,
-  ORB_INSET_STARTS = ORB_INSET_TURNS * ORB_FIND_INSET_SIZES
+  ORB_INSET_STARTS = ORB_INSET_TURNS * ORB_FIND_INSET_SIZES,
+  ORB_INSET_STARTS_MOST = 2 * ORB_INSET_STARTS /* those of the grid, and those where landmarks meet */
 };
 
 /* A point of the small shape, around the middle of its box, and its unit normal. */
