@@ -6,7 +6,7 @@
                               [--store DIR] [--fresh] [--out FILE.md] [--json FILE.json]
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
-docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half that is
+docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed, `parts` 81 heads and busts. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half that is
 only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
@@ -263,6 +263,7 @@ def list_pairs(options):
     sets = {"people": correspond_pairs.posed(meshes),
             "animals": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store),
             "drawn": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, map(int, options.seeds.split(","))),
+            "parts": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, of_parts=True),
             "real": correspond_pairs.real(meshes, surface_of)}
     unknown = set(wanted) - set(sets)
     if unknown:

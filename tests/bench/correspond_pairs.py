@@ -83,15 +83,30 @@ def drawn(seed):
     return rows
 
 
+PARTS_CHOSEN_ON = 27  # the first pairs of parts()
+
+
+def parts():
+    """Heads and busts in poses. ORB_FIND_INSET_OFF was chosen on the first PARTS_CHOSEN_ON, and nothing on the others."""
+    draw = random.Random(5)
+    bodies = [girth + pose for girth in ("", "slim-", "stout-") for pose in ("stand", "nod", "look")]
+    rows = [[f"head-{head}.obj", f"bust-{bust}.obj"] for head, bust in itertools.product(bodies, bodies)]
+    draw.shuffle(rows)
+    for row in rows:
+        if draw.random() < 0.5:
+            row.reverse()
+    return [(first, second, "part") for first, second in rows]
+
+
 def posed(meshes):
     """People in poses. Constants were first chosen on even rows of pairs.csv, so these stay the half `choose`."""
     if (meshes / "posed").is_dir():
         yield from folder_pairs("people", meshes / "posed", listed(meshes / "posed"), lambda i, _: ("choose", "report")[i % 2])
 
 
-def animals(program, store, seeds=()):
-    """Generated animals, in a folder for each build of the program: the pairs that it lists, or drawn ones. A body is
-    written when it is first needed."""
+def animals(program, store, seeds=(), of_parts=False):
+    """Generated animals, in a folder for each build of the program: the pairs that it lists, drawn ones, or parts. A body
+    is written when it is first needed."""
     if not program.exists():
         return
     folder = store / f"animals-{hashlib.sha256(program.read_bytes()).hexdigest()[:8]}"
@@ -108,7 +123,9 @@ def animals(program, store, seeds=()):
                 for file in (f"{stem}.truth.csv", name):  # the body last: it stands for both
                     pathlib.Path(made, file).rename(folder / file)
 
-    if not seeds:
+    if of_parts:
+        yield from folder_pairs("parts", folder, parts(), lambda i, _: "choose" if i < PARTS_CHOSEN_ON else "report", make)
+    elif not seeds:
         yield from folder_pairs("animals", folder, listed(folder), lambda _, title: half_of(title), make)
     for seed in seeds:
         half = "choose" if seed in CHOSEN_ON else "report"
