@@ -48,6 +48,8 @@ static orb_status cross(orb_context *ctx, void *arg, int32_t i) {
       one->pose[s] = crossed.pose[s];
       crossed.pose[s] = before;
       one->bend[s] = crossed.bend[s];
+      one->resized[s] = crossed.resized[s];
+      one->scattered[s] = crossed.scattered[s];
     }
   }
   orb_trial_fill_cost(t, one, 2);

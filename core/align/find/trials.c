@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/evidence.h"
 #include "align/find/tips.h"
 #include "align/map/engine/surface.h"
 #include "align/rotate/correlate.h"
@@ -12,7 +13,6 @@
 #include "base/memory.h"
 #include "base/tasks.h"
 #include "elastic/elastic.h"
-#include "numeric/rotation.h"
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
 
@@ -269,8 +269,13 @@ orb_status orb_trials_make(orb_trials *t) {
 }
 
 orb_status orb_trial_register(orb_context *ctx, const orb_trials *t, orb_trial *one, int s) {
-  return orb_elastic_register(ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &t->survey[s].around, &one->map[s], NULL,
-                              &one->pose[s], &one->bend[s]);
+  const orb_mesh *copy = &t->copy[s].mesh, *other = &t->copy[1 - s].mesh;
+  const double *pose = one->pose[s].position;
+  ORB_TRY(
+      orb_elastic_register(ctx, copy, other, &t->survey[s].around, &one->map[s], NULL, &one->pose[s], &one->bend[s]));
+  one->resized[s] = orb_evidence_resized(copy, pose);
+  one->scattered[s] = orb_evidence_scattered(copy, pose, other, t->survey[1 - s].tree);
+  return ORB_OK;
 }
 
 /* Trials that are registered at once. */
@@ -299,27 +304,6 @@ static orb_status register_all(orb_trials *t, int direction) {
   return orb_context_check(t->ctx);
 }
 
-/* The angle of the rotation that carries copy s best onto its pose, over π. */
-static double rotation_of(const orb_trials *t, const orb_trial *one, int s) {
-  const orb_mesh *mesh = &t->copy[s].mesh;
-  const double *x = mesh->positions, *y = one->pose[s].position;
-  double mean[2][3] = {{0}}, h[9] = {0}, r[9];
-  for (int32_t v = 0; v < mesh->vertex_count; v++) {
-    for (int k = 0; k < 3; k++) {
-      mean[0][k] += x[3 * (size_t)v + (size_t)k] / mesh->vertex_count;
-      mean[1][k] += y[3 * (size_t)v + (size_t)k] / mesh->vertex_count;
-    }
-  }
-  for (int32_t v = 0; v < mesh->vertex_count; v++) {
-    double p[3], q[3];
-    orb_sub(x + 3 * (size_t)v, mean[0], p);
-    orb_sub(y + 3 * (size_t)v, mean[1], q);
-    orb_add_outer(h, q, p, 1);
-  }
-  (void)orb_nearest_rotation(h, r);
-  return acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
-}
-
 void orb_trial_images(const orb_trials *t, const orb_trial *one, int s, int32_t *out) {
   orb_survey_images(&t->survey[1 - s], &t->copy[1 - s].mesh, one->pose[s].position, t->copy[s].mesh.vertex_count, out);
 }
@@ -333,14 +317,22 @@ int orb_trial_keeps_hint(const orb_trials *t, const orb_trial *one, int s) {
   return orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) <= most_off(t);
 }
 
+/* The cost by the first direction or by both. */
+static double cost_of(const orb_trials *t, const orb_trial *one, int directions) {
+  const int last = directions - 1;
+  const double bend = (one->bend[0] + one->bend[last]) / 2, resized = fmax(one->resized[0], one->resized[last]),
+               scattered = (one->scattered[0] + one->scattered[last]) / 2,
+               rotated = orb_evidence_rotated(&t->copy[0].mesh, one->pose[0].position);
+  return pow(bend, ORB_FIND_BEND_POWER) * exp(ORB_FIND_RESIZED_COST * resized + ORB_FIND_SCATTERED_COST * scattered) *
+         (1 + ORB_FIND_ROTATION_COST * rotated) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
+}
+
 void orb_trial_fill_cost(const orb_trials *t, orb_trial *one, int directions) {
-  const double factor =
-      (1 + ORB_FIND_ROTATION_COST * rotation_of(t, one, 0)) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
-  const double bend = directions == 2 ? (one->bend[0] + one->bend[1]) / 2 : one->bend[0];
   const int is_kept = directions == 1 || orb_trial_keeps_hint(t, one, 0) || orb_trial_keeps_hint(t, one, 1);
-  const int is_known = is_kept && isfinite(one->bend[0] * factor) && isfinite(bend * factor);
-  one->rough = is_known ? one->bend[0] * factor : INFINITY;
-  one->cost = is_known ? bend * factor : INFINITY;
+  const double rough = cost_of(t, one, 1), cost = cost_of(t, one, directions);
+  const int is_known = is_kept && isfinite(rough) && isfinite(cost);
+  one->rough = is_known ? rough : INFINITY;
+  one->cost = is_known ? cost : INFINITY;
 }
 
 /* Dropped trials come last, by their rough cost. */

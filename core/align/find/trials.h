@@ -1,4 +1,5 @@
-/* Trials: rough maps between decimated copies of two shapes, registered and ranked by how much they bend the copies.
+/* Trials: rough maps between decimated copies of two shapes, registered and ranked by how much they bend the copies and
+ * by what else their poses tell (evidence.h).
  *
  * In: two meshes, and perhaps places of landmarks on their copies. Out: the trials with their poses and costs, and the
  * best of those that differ. match.h describes the method and writes the result.
@@ -25,9 +26,10 @@ typedef struct orb_trial {
   orb_rough_map map[2];
   orb_elastic_pose pose[2];
   double bend[2];
-  double rough;     /* cost in the first direction alone */
-  double asymmetry; /* see mirrored.h; 0: not known */
-  int32_t *own[2];  /* the rough map, if it is neither spectral nor a rotation; else NULL */
+  double resized[2], scattered[2]; /* of the poses: see evidence.h */
+  double rough;                    /* cost in the first direction alone */
+  double asymmetry;                /* see mirrored.h; 0: not known */
+  int32_t *own[2];                 /* the rough map, if it is neither spectral nor a rotation; else NULL */
   double cost; /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
                   INFINITY as  well, its poses may not be set */
 } orb_trial;
