@@ -87,10 +87,10 @@ static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, 
 
 /* Aligns copies of the later shapes, then lets the shapes follow. *lifted 0: the whole shapes must be aligned, because
  * the copies do not meet at the landmarks or are not certified, or a shape cannot follow its copy. `out` is then empty.
- */
+ * energy: of the copies' map. */
 static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                               orb_alignment *out, int *lifted) {
+                               orb_alignment *out, double *energy, int *lifted) {
   const orb_map_params params = orb_map_params_of(options->preset);
   const int32_t keep_until = orb_map_keep_until(&params, landmark_count);
   const int32_t size = orb_map_copy_size(&params, keep_until);
@@ -101,6 +101,7 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
     status = align_shapes(ctx, copies.shapes, shape_count, copies.landmarks, landmark_count, options, out);
   }
   if (status == ORB_OK) {
+    *energy = out->energy;
     status = orb_align_lift(ctx, &copies, landmarks, landmark_count, options->preset, out, lifted);
   }
   orb_copies_free(ctx, &copies);
@@ -108,10 +109,12 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
 }
 
 /* Adds what a reader may know of the alignment: found landmarks and how sure they are, or landmarks that may be
- * misplaced.
+ * misplaced. energy: of the map that was found. Copies whose first shape has moved have less than the whole shapes that
+ * follow them, whose energy is that of the later ones' triangles; but the match is the same.
  */
 static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
-                           int32_t landmark_count, const orb_align_options *options, orb_alignment *out) {
+                           int32_t landmark_count, const orb_align_options *options, double energy,
+                           orb_alignment *out) {
   const int holds_part = out->landmark_count > landmark_count;
   if (holds_part) {
     orb_alignment_forget_landmarks(ctx, landmark_count, out);
@@ -124,9 +127,8 @@ static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, cons
   }
   const double clear = out->match.clear;
   if (out->match.is_measured) {
-    out->match.confidence = out->match.is_part
-                                ? ORB_FIND_SURE_PART
-                                : orb_match_confidence(out->match.bend, clear, out->match.lead, out->energy);
+    out->match.confidence =
+        out->match.is_part ? ORB_FIND_SURE_PART : orb_match_confidence(out->match.bend, clear, out->match.lead, energy);
   } else {
     memset(&out->match, 0, sizeof out->match);
   }
@@ -267,15 +269,17 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
   const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
   orb_status status = ORB_OK;
+  double energy = INFINITY;
   int lifted = 0;
   if (is_large(shapes, shape_count, options)) {
-    ORB_GO(status, align_copies(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &lifted), end);
+    ORB_GO(status, align_copies(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &energy, &lifted),
+           end);
   }
   if (!lifted) {
     ORB_GO(status, align_shapes(ctx, shapes, shape_count, landmarks, landmark_count, options, out), end);
   }
   ORB_GO(status, match_rims(ctx, shapes, options, out), end);
-  status = describe(ctx, shapes, landmarks, landmark_count, options, out);
+  status = describe(ctx, shapes, landmarks, landmark_count, options, lifted ? energy : out->energy, out);
 end:
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
