@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "store/catalogue.h"
+#include "store/crashes.h"
 #include "store/owners.h"
 #include "store/tokens.h"
 #include "support_store.h"
@@ -211,10 +212,51 @@ static void test_migration_to_owners(void **state) {
   assert_true(catalogue_integrity(s->cat));
 }
 
+/* A catalogue that counted the deaths of a key for the tenant of the last one alone (version BEFORE_TENANTS): what was
+ * refused stays refused, and another tenant's death of the same key counts beside the old ones. The rest of the schema
+ * is of the present version, whose last step this is: a later step needs a catalogue of its own here. */
+static void test_migration_of_crashes(void **state) {
+  stored *s = *state;
+  enum { BEFORE_TENANTS = 19 };
+  if (s->url[0]) {
+    skip(); /* of files of SQLite */
+  }
+  char path[96];
+  sqlite3 *db = NULL;
+  api_text list = {0};
+  catalogue_close(s->cat);
+  s->cat = NULL;
+  snprintf(path, sizeof path, "%s/catalogue.sqlite", s->data);
+  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+  assert_int_equal(version_of(db), BEFORE_TENANTS + 1);
+  assert_int_equal(sqlite3_exec(db,
+                                "DROP TABLE crash;"
+                                "CREATE TABLE crash(key TEXT PRIMARY KEY, mesh TEXT NOT NULL, tenant TEXT NOT NULL,"
+                                " count INTEGER NOT NULL, last INTEGER NOT NULL) WITHOUT ROWID;"
+                                "INSERT INTO crash VALUES('bad', 'cow', 'ann', 3, 7), ('worse', 'dog', 'bob', 2, 8);"
+                                "PRAGMA user_version=19;",
+                                NULL, NULL, NULL),
+                   SQLITE_OK);
+  sqlite3_close(db);
+  assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
+  assert_int_equal(catalogue_crashed(s->cat, "bad"), 1);
+  assert_int_equal(catalogue_crashed(s->cat, "worse"), 0);
+  catalogue_crash_of_mesh(s->cat, "worse", "eve", 9);
+  assert_int_equal(catalogue_crash_clear(s->cat, "none"), STORE_NOT_FOUND); /* waits for the write before */
+  assert_int_equal(catalogue_crashed(s->cat, "worse"), 1);
+  assert_int_equal(catalogue_crash_list(s->cat, &list), 3);
+  assert_non_null(strstr(list.data, "ann"));
+  api_text_free(&list);
+  assert_int_equal(catalogue_crash_clear(s->cat, "bob"), STORE_OK); /* as of old rows too */
+  assert_int_equal(catalogue_crashed(s->cat, "worse"), 0);
+  assert_true(catalogue_integrity(s->cat));
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_migrations, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_migration_to_owners, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_migration_of_crashes, stored_setup, stored_teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
