@@ -48,8 +48,8 @@ static orb_status write_pairs(const orb_trials *t, const orb_trial *one, orb_mat
 }
 
 /* How many times as much another trial bends the shapes: the geometric mean of the ratios of their bends and of their
- * costs. So the rotation in space and the asymmetry count by half: files say which of two sides that look alike is the
- * front, but not that they look different. */
+ * costs. So what else they cost counts by half: files say which of two sides that look alike is the front, but not that
+ * they look different. */
 static double lead_over(const orb_trial *best, const orb_trial *other) {
   const int both = other->cost < INFINITY;
   const double bend = both ? (best->bend[0] + best->bend[1]) / 2 : best->bend[0];

@@ -32,7 +32,7 @@ enum {
   ORB_FIND_TIPS = 6 /* matches of tips that are tried (tips.h): with 12 or 24, no more pairs of animals are right */
 };
 
-/* A rotation by π in space multiplies the bend of a map by 1 + this, because files usually have shapes upright and
+/* A rotation by π in space multiplies the cost of a map by 1 + this, because files usually have shapes upright and
  * facing one way: a man matched back to front bends hardly more than one matched correctly. Of 131 pairs of animals of
  * other kinds, 4 more have the right map first than with 0.5; with 0.1 to 0.2 as many do. All of 40 pairs of people are
  * right with either. */
@@ -202,10 +202,10 @@ static const double ORB_FIND_INSET_MOST_ENERGY = 10;
  * on whose torso the torso of a cow lies has 0.31. */
 static const double ORB_FIND_INSET_STRAY = 0.12;
 
-/* A map that bends this many times as much as the best one in one direction does not win by the other direction: the
- * two directions of a right map differ by a factor of 1.5. */
+/* A map that costs this many times as much as the best one in one direction does not win by the other direction: the
+ * bends of a right map in two directions differ by a factor of 1.5. */
 static const double ORB_FIND_BEHIND = 2;
-/* If the map of the best match has more energy than this, the next best match is tried as well, unless it bends
+/* If the map of the best match has more energy than this, the next best match is tried as well, unless it costs
  * OTHER_BEHIND times as much. Three in four right maps of two people have at most 1.2. Of 56 pairs of real meshes and
  * five of people and animals, the next one led to the better map in three, and bent at most 1.12 times as much. */
 static const double ORB_FIND_OTHER_ABOVE = 1.2, ORB_FIND_OTHER_BEHIND = 1.5;
@@ -231,7 +231,7 @@ static const double ORB_FIND_CONTEST_GAIN = 0.95;
 /* The second best walk is finished as well if it exceeds 1 by at most this many times what the best one does: walks
  * towards one match differ by a tenth, so they do not tell closer ones apart. */
 static const double ORB_FIND_CONTEST_CLOSE = 1.15;
-/* If both walks of the match have more energy than this, the next best match walks too, unless it bends CONTEST_BEHIND
+/* If both walks of the match have more energy than this, the next best match walks too, unless it costs CONTEST_BEHIND
  * times as much. Of 25 such contests of 117 between real meshes, it won eight. */
 static const double ORB_FIND_CONTEST_POOR = 2.5, ORB_FIND_CONTEST_BEHIND = 4;
 /* If the mean energy of the maps of several matches is above this, their pairs are pinned. Chosen when two shapes were

@@ -75,8 +75,8 @@ typedef struct orb_match_facts {
   double bend;     /* of the best rough map: 0 for a rigid motion */
   double clear;    /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
   double lead;     /* how much the nearest other rough map bends the shapes, divided by the same for the best one;
-                      both count half of the rotation in space and of the asymmetry. About 1: the shapes do not decide
-                      which is right, for example because one looks alike from several sides. At most 100 */
+                      what else tells right maps from wrong ones (docs/method.md) counts half. About 1: the shapes do not
+                      decide     which is right, for example because one looks alike from several sides. At most 100 */
   double confidence; /* 0 to 1, with the mean energy; calibrated on two shapes (docs/bench-confidence.md) */
 } orb_match_facts;
 
