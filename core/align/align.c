@@ -110,7 +110,8 @@ static orb_status align_copies(orb_context *ctx, const orb_align_shape *shapes, 
 
 /* Adds what a reader may know of the alignment: found landmarks and how sure they are, or landmarks that may be
  * misplaced. energy: of the map that was found. Copies whose first shape has moved have less than the whole shapes that
- * follow them, whose energy is that of the later ones' triangles; but the match is the same.
+ * follow them, whose energy is that of the later ones' triangles; but the match is the same. What bringing rims
+ * together adds counts only where no copies are followed.
  */
 static orb_status describe(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
                            int32_t landmark_count, const orb_align_options *options, double energy,

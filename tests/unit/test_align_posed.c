@@ -13,6 +13,7 @@
 
 #include "../samples/posed.h"
 #include "align/find/hint.h"
+#include "align/map/engine/params.h"
 #include "numeric/vec3.h"
 #include "orbmorph/align.h"
 #include "orbmorph/format.h"
@@ -294,6 +295,8 @@ static orb_match_facts match_of_cow_and_giraffe(int is_fine) {
   if (is_fine) {
     refine(ctx, &bodies[1]);
   }
+  const int32_t large = orb_map_params_of(ORB_PRESET_DEFAULT).copies.large;
+  assert_true(bodies[1].mesh.vertex_count > large ? is_fine : !is_fine);
   const orb_align_shape shapes[2] = {{&bodies[0].mesh, bodies[0].embedding.points},
                                      {&bodies[1].mesh, bodies[1].embedding.points}};
   orb_align_defaults(&options);

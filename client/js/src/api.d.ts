@@ -459,7 +459,7 @@ export type Supermesh = {
     verdict: 'sure' | 'likely' | 'unsure';
     /** From 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs. */
     clear: number;
-    /** The bend of the nearest other rough map, divided by that of the best one; both include half of the cost of the rotation in space. About 1 if a shape looks alike from several sides, so that no match stands out; such a match is never `sure`. */
+    /** The geometric mean of two ratios of the nearest other rough map to the best one: of how much they bend the shapes, and of what they cost. About 1 if a shape looks alike from several sides, so that no match stands out; such a match is never `sure`. */
     lead: number;
     /** How much the best rough map bends the shapes: 0 for a rigid motion. */
     bend: number;
@@ -468,7 +468,7 @@ export type Supermesh = {
   };
   /** Other correspondences that the search considered, the best first; empty unless a correspondence was found. Absent if an older engine made the supermesh. */
   alternatives?: Array<{
-    /** How much its rough map bends the shapes, as a multiple of the best one's. */
+    /** What its rough map costs, as a multiple of the best one: how much it bends and resizes the shapes, how unlike it leaves normals, how far it turns, and how far mirror images are off. */
     cost: number;
     /** The later shape that it matches differently; the others are matched as in this supermesh. Absent if an older engine made the supermesh. */
     shape?: number;

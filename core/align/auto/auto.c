@@ -117,7 +117,8 @@ static orb_status next_open(orb_context *ctx, const orb_align_shape *shapes, con
                             const orb_align_options *options, double energy, const orb_map_course *best,
                             next_match *next) {
   const double cost = m->shape_count == 2 && m->of[1].other_count > 0 ? m->of[1].other[0].cost : INFINITY;
-  if (!(energy > ORB_FIND_OTHER_ABOVE) || cost > ORB_FIND_OTHER_BEHIND || m->bend * cost > ORB_FIND_WALKS_FIRST) {
+  if (!(energy > ORB_FIND_OTHER_ABOVE) || cost > ORB_FIND_OTHER_BEHIND ||
+      m->of[1].other[0].bend > ORB_FIND_WALKS_FIRST) {
     return ORB_OK;
   }
   ORB_TRY(orb_match_target(ctx, &m->of[1], 1, 1, &next->target));

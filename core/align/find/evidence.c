@@ -8,7 +8,7 @@
 
 double orb_evidence_rotated(const orb_mesh *copy, const double *pose) {
   const double *x = copy->positions;
-  double mean[2][3] = {{0}}, h[9] = {0}, r[9];
+  double mean[2][3] = {{0}}, h[9] = {0}, r[9] = {0};
   for (int32_t v = 0; v < copy->vertex_count; v++) {
     for (int k = 0; k < 3; k++) {
       mean[0][k] += x[3 * (size_t)v + (size_t)k] / copy->vertex_count;
@@ -73,5 +73,5 @@ double orb_evidence_scattered(const orb_mesh *copy, const double *pose, const or
   for (int k = 0; k < 9; k++) {
     alike += r[k] * h[k];
   }
-  return 1 - alike / all;
+  return fmax(0, 1 - alike / all); /* rounding */
 }

@@ -11,8 +11,8 @@
 /* The angle of the rotation that carries the copy best onto its pose, over π. */
 double orb_evidence_rotated(const orb_mesh *copy, const double *pose);
 
-/* How much the pose resizes the copy's triangles: the mean of |ln(area there / area here)|, weighted by areas. Both
- * copies must have the same area. Areas below ORB_FIND_RESIZED_LEAST count as that. */
+/* How much the pose resizes the copy's triangles: the mean of |ln(area there / area here)|, weighted by areas. The
+ * shapes must have the same area. Areas below ORB_FIND_RESIZED_LEAST count as that. */
 double orb_evidence_resized(const orb_mesh *copy, const double *pose);
 
 /* How unlike the copy's normals are to those of the other one's triangles that are nearest to the pose, after the

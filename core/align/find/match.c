@@ -47,9 +47,9 @@ static orb_status write_pairs(const orb_trials *t, const orb_trial *one, orb_mat
   return ORB_OK;
 }
 
-/* How many times as much another trial bends the shapes: the geometric mean of the ratios of their bends and of their
- * costs. So what else they cost counts by half: files say which of two sides that look alike is the front, but not that
- * they look different. */
+/* The geometric mean of two ratios of another trial to the best one: of their bends, and of their costs. So what else
+ * they cost counts by half: files say which of two sides that look alike is the front, but not that they look
+ * different. */
 static double lead_over(const orb_trial *best, const orb_trial *other) {
   const int both = other->cost < INFINITY;
   const double bend = both ? (best->bend[0] + best->bend[1]) / 2 : best->bend[0];
@@ -72,6 +72,7 @@ static orb_status write_ranking(const orb_trials *t, orb_match *out) {
     orb_match_other *other = &out->other[out->other_count++];
     cost = fmax(cost, one->cost < INFINITY ? one->cost / best->cost : one->rough / best->rough);
     other->cost = cost;
+    other->bend = one->cost < INFINITY ? (one->bend[0] + one->bend[1]) / 2 : one->bend[0];
     out->lead = fmin(out->lead, lead_over(best, one));
     ORB_TRY(write_pairs(t, one, &other->pairs));
   }
@@ -352,7 +353,7 @@ orb_status orb_match_choose(orb_context *ctx, orb_match *match, int32_t k, doubl
 void orb_match_demote(orb_match *match) {
   const int32_t kept = match->other_count < ORB_MATCH_OTHERS ? match->other_count : ORB_MATCH_OTHERS - 1;
   memmove(match->other + 1, match->other, (size_t)kept * sizeof *match->other);
-  match->other[0] = (orb_match_other){.cost = 1, .pairs = match->pairs};
+  match->other[0] = (orb_match_other){.cost = 1, .bend = match->bend, .pairs = match->pairs};
   match->other_count = kept + 1;
 }
 

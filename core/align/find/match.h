@@ -1,11 +1,13 @@
-/* Which points of two shapes correspond, by rough maps, ranked by how much they bend the shapes. If there are
- * landmarks, they exclude maps, and draw the best of the others to their partners.
+/* Which points of two shapes correspond, by rough maps, ranked by how much they bend the shapes and by what else tells
+ * right limbs from wrong ones. If there are landmarks, they exclude maps, and draw the best of the others to their
+ * partners.
  *
  * In: two meshes. Out: where each vertex of the second lies on the first. Read in this order:
  *
  *   hint.h    what landmarks say of a match
  *   survey.h  what trials share of a copy
  *   tips.h    tips of limbs, and rotations of the spheres under which they meet
+ *   evidence.h what a registration tells beside its bend
  *   trials.h  rough maps, registered and ranked
  *   agreed.h, extended.h
  *             rough maps that follow from the part on which a trial agrees with its way back
@@ -53,6 +55,7 @@ typedef struct orb_match_pairs {
 
 typedef struct orb_match_other {
   double cost; /* as a multiple of the best map's: at least 1. From one direction alone where that dropped the map */
+  double bend; /* how much it bends, likewise */
   orb_match_pairs pairs;
 } orb_match_other;
 
@@ -66,12 +69,10 @@ typedef struct orb_match {
                     if the hint allows it */
   double walks_above; /* walks follow the best map if it bends the shapes more than this */
   double bend;        /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
-  double cost;        /* its bend, times 1 to 1 + ORB_FIND_ROTATION_COST for its rotation in space, times 1 +
-                         ORB_FIND_ASYMMETRY_COST for each unit of its asymmetry (mirrored.h) */
+  double cost;        /* of its trial (trials.h) */
   double clear;       /* 0 to 1: how far the next best map that differs is behind */
-  double lead; /* how much the nearest other map bends the shapes, divided by the same for the best one; both include
-                  half of the cost of the rotation in space and of the asymmetry. About 1 if a shape looks alike from
-                  several sides */
+  double lead; /* the geometric mean of two ratios of the nearest other map to the best one: of their bends, and of
+                  their costs. About 1 if a shape looks alike from several sides */
   int moves; /* which shape moves where only one does: the second (1), unless the first (0) is clearly less round. Limbs
                 that move stretch to where they go; limbs that stay are left out by the triangles of a round shape */
   orb_match_pairs pairs;

@@ -317,19 +317,19 @@ int orb_trial_keeps_hint(const orb_trials *t, const orb_trial *one, int s) {
   return orb_hint_off(&t->hint, &t->copy[s], s, one->pose[s].position) <= most_off(t);
 }
 
-/* The cost by the first direction or by both. */
-static double cost_of(const orb_trials *t, const orb_trial *one, int directions) {
+/* What the poses of the first direction or of both cost. */
+static double cost_of(const orb_trial *one, int directions) {
   const int last = directions - 1;
   const double bend = (one->bend[0] + one->bend[last]) / 2, resized = fmax(one->resized[0], one->resized[last]),
-               scattered = (one->scattered[0] + one->scattered[last]) / 2,
-               rotated = orb_evidence_rotated(&t->copy[0].mesh, one->pose[0].position);
-  return pow(bend, ORB_FIND_BEND_POWER) * exp(ORB_FIND_RESIZED_COST * resized + ORB_FIND_SCATTERED_COST * scattered) *
-         (1 + ORB_FIND_ROTATION_COST * rotated) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry);
+               scattered = (one->scattered[0] + one->scattered[last]) / 2;
+  return pow(bend, ORB_FIND_BEND_POWER) * exp(ORB_FIND_RESIZED_COST * resized + ORB_FIND_SCATTERED_COST * scattered);
 }
 
 void orb_trial_fill_cost(const orb_trials *t, orb_trial *one, int directions) {
   const int is_kept = directions == 1 || orb_trial_keeps_hint(t, one, 0) || orb_trial_keeps_hint(t, one, 1);
-  const double rough = cost_of(t, one, 1), cost = cost_of(t, one, directions);
+  const double rotated = orb_evidence_rotated(&t->copy[0].mesh, one->pose[0].position),
+               factor = (1 + ORB_FIND_ROTATION_COST * rotated) * (1 + ORB_FIND_ASYMMETRY_COST * one->asymmetry),
+               rough = factor * cost_of(one, 1), cost = factor * cost_of(one, directions);
   const int is_known = is_kept && isfinite(rough) && isfinite(cost);
   one->rough = is_known ? rough : INFINITY;
   one->cost = is_known ? cost : INFINITY;

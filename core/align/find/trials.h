@@ -109,7 +109,8 @@ void orb_trials_list(orb_trials *trials);
 /* Registers trial `number` in the second direction, and sets its cost by both. */
 ORB_MUST_CHECK orb_status orb_trials_complete(orb_context *ctx, orb_trials *trials, int32_t number);
 
-/* Registers a trial of these copies in direction s, along its maps: fills its pose and its bend. May run beside others.
+/* Registers a trial of these copies in direction s, along its maps: fills its pose, its bend, and what else that
+ * tells. Both copies must have been surveyed. May run beside others.
  */
 ORB_MUST_CHECK orb_status orb_trial_register(orb_context *ctx, const orb_trials *trials, orb_trial *one, int s);
 

@@ -56,7 +56,7 @@ enum { ORB_FOUND_MAX = 12, ORB_ALTERNATIVES_MAX = 4, ORB_ALTERNATIVE_PAIRS = 12 
  * the same features only roughly. Where one shape is matched as a part of the other one, the first alternative matches
  * the shapes as wholes. */
 typedef struct orb_alternative {
-  double cost;   /* how much its rough map bends the shapes, as a multiple of the best one's: at least 1 */
+  double cost;   /* what its rough map costs (docs/method.md), as a multiple of the best one: at least 1 */
   int32_t shape; /* the later shape that is matched differently */
   int32_t count; /* at most ORB_ALTERNATIVE_PAIRS */
   orb_place *at; /* count × shape_count places, on the given meshes */
@@ -74,10 +74,11 @@ typedef struct orb_match_facts {
                       follows, but for the confidence, is of the wholes */
   double bend;     /* of the best rough map: 0 for a rigid motion */
   double clear;    /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
-  double lead;     /* how much the nearest other rough map bends the shapes, divided by the same for the best one;
-                      what else tells right maps from wrong ones (docs/method.md) counts half. About 1: the shapes do not
-                      decide     which is right, for example because one looks alike from several sides. At most 100 */
-  double confidence; /* 0 to 1, with the mean energy; calibrated on two shapes (docs/bench-confidence.md) */
+  double lead; /* the geometric mean of two ratios of the nearest other rough map to the best one: of their bends, and
+                  of their costs. About 1: the shapes do not decide which is right, for example because one looks alike
+                  from several sides. At most 100 */
+  double confidence; /* 0 to 1, with the mean energy, of copies if whole shapes follow them; calibrated on two shapes
+                        (docs/bench-confidence.md) */
 } orb_match_facts;
 
 /* A given landmark that may be misplaced. When the optimiser releases it, it moves far from its given place. */

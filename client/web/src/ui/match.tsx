@@ -6,7 +6,7 @@ import { isWord, sideOf } from '../mesh/others';
 import { player } from '../player';
 import { Button, count, relative } from './parts';
 
-/** Another match lowers the confidence if it bends the shapes less than twice as much. Others are not worth a word. */
+/** Another match lowers the confidence if it costs less than twice as much. Others are not worth a word. */
 const CREDIBLE = 2;
 
 /** What may be otherwise, in words, by the best other match that has any: "the tail of dog may be the … of giraffe". */
