@@ -17,7 +17,7 @@ void orb_body_normals(const orb_mesh *m, const double *x, double *normal, double
   for (int32_t t = 0; t < m->triangle_count; t++) {
     const int32_t *v = m->triangles + 3 * (size_t)t;
     double n[3];
-    orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], n);
+    orb_triangle_normal_at(x, v, n);
     double area = orb_length(n) / 2;
     for (int k = 0; k < 3; k++) {
       for (int i = 0; i < 3; i++) {

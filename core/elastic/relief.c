@@ -270,7 +270,7 @@ static void fill_slopes(const orb_body *b, const double *height, double *area, d
   for (int32_t t = 0; t < b->mesh->triangle_count; t++) {
     const int32_t *v = b->mesh->triangles + 3 * (size_t)t;
     double n[3], gradient[ORB_RELIEF_SIZES][3] = {{0}};
-    orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], n);
+    orb_triangle_normal_at(x, v, n);
     const double twice = orb_length(n);
     if (!(twice > 0)) {
       continue;

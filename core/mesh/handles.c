@@ -65,8 +65,7 @@ static double diagonal_of(const orb_mesh *mesh, double *facing) {
 
 static double area_of(const orb_mesh *mesh, int32_t t) {
   const int32_t *c = mesh->triangles + 3 * (size_t)t;
-  return orb_triangle_area(mesh->positions + 3 * (size_t)c[0], mesh->positions + 3 * (size_t)c[1],
-                           mesh->positions + 3 * (size_t)c[2]);
+  return orb_triangle_area_at(mesh->positions, c);
 }
 
 /* Whether the patches of a loop lie outside the body: the surface then faces the loop's centre. */

@@ -164,8 +164,7 @@ static int is_sheet(const orb_mesh *mesh, int32_t old, double area) {
   for (int32_t t = old; t < mesh->triangle_count; t++) {
     const int32_t *v = mesh->triangles + 3 * (size_t)t;
     if (mesh->source_triangle[t] == ORB_MADE_FILL) {
-      fills += orb_triangle_area(mesh->positions + 3 * (size_t)v[0], mesh->positions + 3 * (size_t)v[1],
-                                 mesh->positions + 3 * (size_t)v[2]);
+      fills += orb_triangle_area_at(mesh->positions, v);
     }
   }
   return fills >= SHEET * area;

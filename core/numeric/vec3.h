@@ -8,6 +8,8 @@
 #define ORB_NUMERIC_VEC3_H
 
 #include <math.h>
+#include <stddef.h>
+#include <stdint.h>
 
 /* Keeps a divisor from being 0. It is far below the rounding of every length, area and determinant of a shape, so
  * adding it changes no other quotient. */
@@ -63,6 +65,15 @@ static inline double orb_triangle_area(const double a[3], const double b[3], con
   double n[3];
   orb_triangle_normal(a, b, c, n);
   return 0.5 * orb_length(n);
+}
+
+/* The same for the triangle with the vertices v; x: 3 coordinates each. */
+static inline void orb_triangle_normal_at(const double *x, const int32_t v[3], double n[3]) {
+  orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], n);
+}
+
+static inline double orb_triangle_area_at(const double *x, const int32_t v[3]) {
+  return orb_triangle_area(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2]);
 }
 
 /* h += weight · y xᵀ; h: 3×3, row-major. */

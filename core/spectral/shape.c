@@ -32,7 +32,7 @@ static void work_free(work *w) {
 
 /* Twice the area of the triangle v. */
 static double triangle_area2(const double *x, const int32_t *v, double normal[3]) {
-  orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], normal);
+  orb_triangle_normal_at(x, v, normal);
   return orb_length(normal);
 }
 

@@ -73,20 +73,12 @@ static void assert_tips(const orb_mesh mesh[2], const orb_alignment *alignment) 
   }
 }
 
-/* Counts of threads, of which sanitizers, which take half a minute each, see the first two. */
-static const int thread_counts[] = {1, 5, 2};
-#ifdef __SANITIZE_ADDRESS__
-enum { COUNTS = 2 };
-#else
-enum { COUNTS = 3 };
-#endif
-
 /* Limbs of other lengths go to their counterparts, and the sphere has the same bytes for any number of threads. lean:
  * the number of the shape with long limbs. */
 static void assert_contest(int lean) {
   double *first[2] = {NULL, NULL};
   double energy = 0;
-  for (size_t t = 0; t < COUNTS; t++) {
+  for (size_t t = 0; t < THREAD_COUNTS; t++) {
     const orb_context_options options = {.threads = thread_counts[t]};
     orb_context *ctx;
     orb_mesh mesh[2];

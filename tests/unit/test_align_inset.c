@@ -13,19 +13,13 @@
 #include "base/check.h"
 #include "orbmorph/align.h"
 #include "orbmorph/locate.h"
+#include "support_align.h"
 #include "support_context.h"
 #include "support_shapes.h"
 
 /* Where the neck begins: its angle from the top of the head, and the share of the way from the top of the shape to its
  * bottom. */
 static const double NECK = 0.85 * M_PI, OF_HEAD = 0.9, OF_BUST = 0.45;
-
-/* With sanitizers an alignment takes a quarter of a minute, so some cases are left out. */
-#ifdef __SANITIZE_ADDRESS__
-enum { IS_SLOW = 1 };
-#else
-enum { IS_SLOW = 0 };
-#endif
 
 /* The surface at a share of the way down, as radius and height: a ball, then the sole of a head, or shoulders. */
 static void profile(int is_bust, double down, double *radius, double *height) {

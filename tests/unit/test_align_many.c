@@ -147,14 +147,6 @@ static void few_landmarks(void **state) {
   crowd_close(&c);
 }
 
-/* Counts of threads, of which sanitizers, which take a quarter of a minute each, see the first two. */
-static const int threads[] = {1, 5, 2};
-#ifdef __SANITIZE_ADDRESS__
-enum { COUNTS = 2 };
-#else
-enum { COUNTS = 3 };
-#endif
-
 /* Maps of several shapes are made side by side. However many threads there are, all points are the same bytes. */
 static void same_for_any_threads(void **state) {
   static const double axis[MARKS][3] = {{0.6, 0.64, 0.48}, {-0.6, -0.64, -0.48}, {0.8, -0.6, 0}, {-0.8, 0.6, 0},
@@ -165,10 +157,10 @@ static void same_for_any_threads(void **state) {
   } tried[] = {{ORB_ALIGN_AUTO, 0}, {ORB_ALIGN_PIN, 3}, {ORB_ALIGN_PIN, MARKS}};
   (void)state;
   for (size_t i = 0; i < sizeof tried / sizeof *tried; i++) {
-    orb_alignment out[COUNTS];
-    crowd c[COUNTS];
-    for (int t = 0; t < COUNTS; t++) {
-      crowd_open_on(&c[t], 4, threads[t]);
+    orb_alignment out[THREAD_COUNTS];
+    crowd c[THREAD_COUNTS];
+    for (int t = 0; t < THREAD_COUNTS; t++) {
+      crowd_open_on(&c[t], 4, thread_counts[t]);
       for (int k = 0; k < tried[i].marks; k++) {
         mark(&c[t], k, axis[k]);
       }
@@ -182,7 +174,7 @@ static void same_for_any_threads(void **state) {
                             3 * (size_t)out[0].shapes[s].mesh.vertex_count * sizeof(double));
       }
     }
-    for (int t = 0; t < COUNTS; t++) {
+    for (int t = 0; t < THREAD_COUNTS; t++) {
       orb_alignment_free(c[t].ctx, &out[t]);
       crowd_close(&c[t]);
     }

@@ -25,15 +25,11 @@ double orb_evidence_rotated(const orb_mesh *copy, const double *pose) {
   return acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
 }
 
-static double area_of(const double *x, const int32_t *v) {
-  return orb_triangle_area(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2]);
-}
-
 double orb_evidence_resized(const orb_mesh *copy, const double *pose) {
   double sum = 0, all = 0;
   for (int32_t t = 0; t < copy->triangle_count; t++) {
     const int32_t *v = copy->triangles + 3 * (size_t)t;
-    const double here = area_of(copy->positions, v), there = area_of(pose, v);
+    const double here = orb_triangle_area_at(copy->positions, v), there = orb_triangle_area_at(pose, v);
     sum += here * fabs(log(fmax(there, ORB_FIND_RESIZED_LEAST) / fmax(here, ORB_FIND_RESIZED_LEAST)));
     all += here;
   }
@@ -42,9 +38,7 @@ double orb_evidence_resized(const orb_mesh *copy, const double *pose) {
 
 /* The normal of triangle t, of length 1. Returns its area; 0: it has no normal. */
 static double normal_of(const orb_mesh *mesh, int32_t t, double n[3]) {
-  const int32_t *v = mesh->triangles + 3 * (size_t)t;
-  const double *x = mesh->positions;
-  orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], n);
+  orb_triangle_normal_at(mesh->positions, mesh->triangles + 3 * (size_t)t, n);
   return 0.5 * orb_normalize(n);
 }
 

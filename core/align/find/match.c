@@ -47,13 +47,17 @@ static orb_status write_pairs(const orb_trials *t, const orb_trial *one, orb_mat
   return ORB_OK;
 }
 
+/* How much a trial bends the shapes: the mean of both directions, or by the first one. */
+static double bend_of(const orb_trial *one, int both) {
+  return both ? (one->bend[0] + one->bend[1]) / 2 : one->bend[0];
+}
+
 /* The geometric mean of two ratios of another trial to the best one: of their bends, and of their costs. So what else
  * they cost counts by half: files say which of two sides that look alike is the front, but not that they look
  * different. */
 static double lead_over(const orb_trial *best, const orb_trial *other) {
   const int both = other->cost < INFINITY;
-  const double bend = both ? (best->bend[0] + best->bend[1]) / 2 : best->bend[0];
-  const double more = both ? (other->bend[0] + other->bend[1]) / 2 : other->bend[0];
+  const double bend = bend_of(best, both), more = bend_of(other, both);
   const double cost = both ? best->cost : best->rough, dearer = both ? other->cost : other->rough;
   const double most = ORB_FIND_LEAD_MOST;
   return more * dearer < most * most * bend * cost ? sqrt(more / bend * (dearer / cost)) : most;
@@ -65,14 +69,14 @@ static orb_status write_ranking(const orb_trials *t, orb_match *out) {
   double cost = 1;
   out->cost = best->cost;
   out->lead = t->listed > 1 ? INFINITY : ORB_FIND_LEAD_ALONE;
-  out->bend = (best->bend[0] + best->bend[1]) / 2;
+  out->bend = bend_of(best, 1);
   out->other_count = 0;
   for (int32_t i = 1; i < t->listed; i++) {
     const orb_trial *one = &t->trial[t->list[i]];
     orb_match_other *other = &out->other[out->other_count++];
     cost = fmax(cost, one->cost < INFINITY ? one->cost / best->cost : one->rough / best->rough);
     other->cost = cost;
-    other->bend = one->cost < INFINITY ? (one->bend[0] + one->bend[1]) / 2 : one->bend[0];
+    other->bend = bend_of(one, one->cost < INFINITY);
     out->lead = fmin(out->lead, lead_over(best, one));
     ORB_TRY(write_pairs(t, one, &other->pairs));
   }
@@ -130,7 +134,7 @@ static orb_status write_targets(orb_context *ctx, const orb_match *match, orb_tr
   }
   ORB_GO(status, orb_elastic_carry(ctx, &t->copy[s].mesh, &one->pose[s], fine->positions, fine->vertex_count, &pose),
          end);
-  const int rounds = (one->bend[0] + one->bend[1]) / 2 > match->walks_above ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
+  const int rounds = bend_of(one, 1) > match->walks_above ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
   ORB_GO(status, orb_elastic_settle(ctx, fine, &t->fine[1 - s].mesh, &held, rounds, &pose), end);
   for (size_t i = 0; i < count; i++) {
     points[i] = (mesh->positions[i] - own->middle[i % 3]) * own->scale;
@@ -188,7 +192,7 @@ static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *s
 
 /* Are the shapes as much alike under a trial as the hint demands? */
 static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double stretch) {
-  return !hint || stretch <= hint->sure || (one->bend[0] + one->bend[1]) / 2 <= ORB_FIND_HINT_BEND;
+  return !hint || stretch <= hint->sure || bend_of(one, 1) <= ORB_FIND_HINT_BEND;
 }
 
 /* Do landmarks leave open which limb is which? Those of one body do not, and neither do many of unlike shapes: of 83

@@ -19,9 +19,7 @@ static void fill_areas(const orb_mesh *mesh, double *area) {
   memset(area, 0, (size_t)mesh->vertex_count * sizeof *area);
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     const int32_t *v = mesh->triangles + 3 * (size_t)t;
-    const double third = orb_triangle_area(mesh->positions + 3 * (size_t)v[0], mesh->positions + 3 * (size_t)v[1],
-                                           mesh->positions + 3 * (size_t)v[2]) /
-                         3;
+    const double third = orb_triangle_area_at(mesh->positions, v) / 3;
     for (int k = 0; k < 3; k++) {
       area[v[k]] += third;
     }

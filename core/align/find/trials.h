@@ -31,7 +31,7 @@ typedef struct orb_trial {
   double asymmetry;                /* see mirrored.h; 0: not known */
   int32_t *own[2];                 /* the rough map, if it is neither spectral nor a rotation; else NULL */
   double cost; /* INFINITY: dropped, because its rough cost is too far behind or landmarks contradict it. If `rough` is
-                  INFINITY as  well, its poses may not be set */
+                  INFINITY as well, its poses may not be set */
 } orb_trial;
 
 /* How a shape is scaled: to area 4π, around the middle of its box. */

@@ -23,9 +23,7 @@ double orb_inset_nearest(const orb_mesh *mesh, const orb_nearest *tree, const do
   }
   const double distance2 = orb_nearest_query_from(tree, p, near, known, &place);
   *near = place;
-  const int32_t *v = mesh->triangles + 3 * (size_t)place.triangle;
-  const double *x = mesh->positions;
-  orb_triangle_normal(x + 3 * (size_t)v[0], x + 3 * (size_t)v[1], x + 3 * (size_t)v[2], normal);
+  orb_triangle_normal_at(mesh->positions, mesh->triangles + 3 * (size_t)place.triangle, normal);
   orb_normalize(normal);
   orb_place_position(mesh, &place, at);
   return sqrt(distance2);

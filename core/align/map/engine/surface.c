@@ -73,7 +73,7 @@ static void fill_density(orb_map_surface *b) {
   for (int32_t t = 0; t < b->triangle_count; t++) {
     const int32_t *v = b->triangles + 3 * (size_t)t;
     double n[3];
-    orb_triangle_normal(b->x + 3 * (size_t)v[0], b->x + 3 * (size_t)v[1], b->x + 3 * (size_t)v[2], n);
+    orb_triangle_normal_at(b->x, v, n);
     b->density[t] = orb_det(b->s + 3 * (size_t)v[0], b->s + 3 * (size_t)v[1], b->s + 3 * (size_t)v[2]) /
                     (orb_length(n) + LEAST_TWICE_AREA);
   }

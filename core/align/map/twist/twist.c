@@ -75,7 +75,7 @@ static double share_inside(const twist_run *run) {
   for (int32_t t = 0; t < b->triangle_count; t++) {
     const int32_t *v = b->triangles + 3 * (size_t)t;
     if (run->inside[v[0]] && run->inside[v[1]] && run->inside[v[2]]) {
-      area += orb_triangle_area(b->x + 3 * (size_t)v[0], b->x + 3 * (size_t)v[1], b->x + 3 * (size_t)v[2]);
+      area += orb_triangle_area_at(b->x, v);
     }
   }
   return area / (4 * M_PI);
