@@ -10,8 +10,8 @@
 #   fuzz       each fuzz target for ORB_FUZZ_SECONDS (3) of CPU time
 #   core       only the library and its unit tests, where the daemon does not build; not part of a full run
 #
-# In a full run the tests in a browser, which run one at a time, run beside asan and release, and so do the fuzz targets,
-# in the time that the tests leave.
+# In a full run the tests in a browser and those that mostly wait, each one at a time, run beside asan and
+# release, and so do the fuzz targets, in the time that the tests leave.
 #
 # A step that fails does not keep later steps from running. The last line is "N passed, N failed, N skipped", summed
 # over tests and fuzz targets; a step that fails outside a test counts as one failure. The exit status is 0 only if
@@ -64,6 +64,9 @@ count_junit() {
 # documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL and S3: their unit
 # tests run here.
 release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|migrate|nodes|cluster'
+# Most of their time passes in waiting for other servers and for clocks. In a full run they are a chain of their own, so
+# that none of them is left alone at the end.
+mostly_waiting='nodes|cluster|migrate|s3'
 # These test more without sanitizers, and run in both builds. All others have run with sanitizers when a full run comes to
 # the release build, and run there only if the build with sanitizers failed.
 in_both='clock|isolate|webhooks|deploy|slow|real_meshes'
@@ -101,32 +104,44 @@ step_release() {
   build_release
   local without=()
   if [ -n "$browser" ]; then
-    without+=(-LE browser)
+    local names="scenario\.($mostly_waiting)"
     if [ -f build-asan/tests.xml ]; then
-      without+=(-E "^($(asan_only))\$")
+      names="$names|$(asan_only)"
     fi
+    without+=(-LE browser -E "^($names)\$")
   fi
   run_tests build "${without[@]}"
 }
 
-# Starts the release build's tests in a browser beside the steps that follow. They have a folder of their own, as two
+# Starts tests of the release build beside the steps that follow, one at a time. Each chain has a folder of its own, as two
 # runs of ctest in one folder overwrite each other's logs.
-#
-# They are the longest chain of the run. At equal priority each gets a seventh of the processor beside six other tests, and
-# at the end one core waits for them; so what runs beside them yields to them.
-browser= browser_began= behind=()
-start_browser() {
-  mkdir -p build/browser
-  rm -f build/browser/tests.xml
-  echo "subdirs(\"$PWD/build\")" >build/browser/CTestTestfile.cmake
-  ctest --test-dir build/browser --output-on-failure --output-junit "$PWD/build/browser/tests.xml" -L browser \
-    >build/browser.log 2>&1 &
-  browser=$! browser_began=$SECONDS
+start_chain() {
+  local chain=$1
+  shift
+  mkdir -p "build/$chain"
+  rm -f "build/$chain/tests.xml"
+  echo "subdirs(\"$PWD/build\")" >"build/$chain/CTestTestfile.cmake"
+  ctest --test-dir "build/$chain" --output-on-failure --output-junit "$PWD/build/$chain/tests.xml" "$@" \
+    >"build/$chain.log" 2>&1 &
+  printf -v "$chain" '%s' $!
+  printf -v "${chain}_began" '%s' $SECONDS
+}
+
+# At equal priority each chain gets an eighth of the processor beside six other tests, and at the end one core waits for it;
+# so what runs beside them yields to them.
+browser= browser_began= waiting= waiting_began= behind=()
+start_chains() {
+  start_chain browser -L browser
+  start_chain waiting -R "^scenario\.($mostly_waiting)\$"
   behind=(nice -n 5)
 }
 
 count_browser() {
   count_junit build/browser/tests.xml
+}
+
+count_waiting() {
+  count_junit build/waiting/tests.xml
 }
 
 # Starts the fuzz targets beside the steps that follow. Tests wait for a quarter of the cores' time; at this priority, the
@@ -141,7 +156,7 @@ count_fuzz() {
   cut -d' ' -f1 build-fuzz/results
 }
 
-# Waits for the browser or the fuzz targets, prints what they printed, and adds their results to the totals.
+# Waits for a chain or the fuzz targets, prints what they printed, and adds their results to the totals.
 finish() {
   local what=$1 status=0 failures pid began
   pid=$what began=${what}_began
@@ -170,7 +185,7 @@ for step in "$@"; do
 done
 
 totals=$(mktemp)
-trap 'rm -f "$totals"; [ -z "$browser$fuzz" ] || kill $browser $fuzz' EXIT
+trap 'rm -f "$totals"; [ -z "$browser$waiting$fuzz" ] || kill $browser $waiting $fuzz' EXIT
 sum() {
   grep -cx "$1" "$totals" || true
 }
@@ -207,13 +222,14 @@ else
   run_step packages
   run_step build
   if [ $status -eq 0 ]; then
-    start_browser
+    start_chains
     start_fuzz
   fi
   run_step asan
   run_step release
   if [ -n "$browser" ]; then
     finish browser
+    finish waiting
     finish fuzz
   else
     run_step fuzz

@@ -13,7 +13,7 @@
 #include "numeric/vec3.h"
 #include "support_exact.h"
 
-const int thread_counts[3] = {1, 5, 2};
+const int thread_counts[3] = {5, 1, 2};
 
 void check_alignment(const orb_alignment *alignment, int landmarks_meet) {
   for (int32_t s = 0; s < alignment->shape_count; s++) {

@@ -199,15 +199,15 @@ static void landmarks_meet(void **unused) {
   (void)unused;
   for (int lean = 0; lean < 2; lean++) {
     double *first[2] = {NULL, NULL};
-    for (int threads = 1; threads <= 2; threads++) {
-      const orb_context_options options = {.threads = threads};
+    for (int t = 0; t < THREAD_COUNTS; t++) {
+      const orb_context_options options = {.threads = thread_counts[t]};
       orb_context *ctx;
       marked m;
       assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
       hold_marked(ctx, lean, &m);
       for (int s = 0; s < 2; s++) {
         const size_t size = 3 * (size_t)m.mesh[s].vertex_count * sizeof(double);
-        if (threads == 1) {
+        if (t == 0) {
           first[s] = test_malloc(size);
           memcpy(first[s], m.alignment.shapes[s].points, size);
         }

@@ -172,7 +172,9 @@ static const open_ball MASKS[2] = {
 static void test_busts(void **state) {
   (void)state;
   check_pair(&BUSTS[0], &BUSTS[1], 1, 1.5, "busts");
-  check_pair(&BUSTS[1], &BUSTS[0], 1, 1.5, "busts, the other way");
+  if (!IS_SLOW) {
+    check_pair(&BUSTS[1], &BUSTS[0], 1, 1.5, "busts, the other way");
+  }
 }
 
 static void test_tubes(void **state) {
@@ -191,7 +193,9 @@ static void test_left_over(void **state) {
   open_ball mute = MASKS[1];
   mute.caps = 3;
   check_pair(&MASKS[0], &mute, 3, 1.5, "mask and mask without a mouth");
-  check_pair(&mute, &MASKS[0], 3, 1.5, "the other way");
+  if (!IS_SLOW) {
+    check_pair(&mute, &MASKS[0], 3, 1.5, "the other way");
+  }
 }
 
 /* Nothing is matched where only one shape has holes. */
