@@ -4,11 +4,13 @@
  * Vertices enter a hash table one by one, keyed by the float32 positions on every shape: first those to keep, then the
  * others, each by number. One that finds its key taken tries base coordinates ±1, ±2, … units in the last place away,
  * the coordinate of largest magnitude first (a small one may be near zero, where a unit would be lost to flushed
- * denormals).
+ * denormals). Where hundreds of vertices share a place, as where a map of shapes that do not correspond is very thin,
+ * it then tries several coordinates at once, in growing cubes.
  */
 #include "transfer/distinct.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -18,7 +20,10 @@
 #include "base/parallel.h"
 
 enum { MAX_ULPS = 16 }; /* units in the last place: more find a place in denser meshes and move vertices farther */
-enum { GRAIN = 16384 }; /* vertices a thread takes at a time */
+/* The same along each of several coordinates: 13³ places. More would let a mesh of coincident vertices take as many
+ * tries for each of them. */
+enum { MAX_CUBE = 6 };
+enum { GRAIN = 16384 };           /* vertices a thread takes at a time */
 enum { CHECK_EVERY = 16384 };     /* vertices between two checks for cancellation */
 static const float TINY = 1e-30f; /* smaller coordinates are near the denormals that clients may flush to zero */
 
@@ -107,6 +112,36 @@ static void axis_order(const float p[3], int order[3]) {
   }
 }
 
+/* Puts v so many units away from a place where it was, if it finds a place of its own there. unit: that of the largest
+ * coordinate, since a small one may be 0. */
+static int put_away(rounding *r, int64_t v, const float from[3], float unit, const int units[3]) {
+  float *p = r->base + 3 * v;
+  for (int c = 0; c < 3; c++) {
+    p[c] = from[c] + (float)units[c] * unit + 0.0f;
+    if (!isfinite(p[c]) || (units[c] != 0 && fabsf(p[c]) < TINY)) {
+      return 0;
+    }
+  }
+  round_deltas(r, v);
+  return insert(r, v);
+}
+
+/* Tries the surface of the cube of 2·reach + 1 units. */
+static int nudge_within_cube(rounding *r, int64_t v, const float from[3], float unit, int reach) {
+  int at[3];
+  for (at[0] = -reach; at[0] <= reach; at[0]++) {
+    for (at[1] = -reach; at[1] <= reach; at[1]++) {
+      const int inside = abs(at[0]) < reach && abs(at[1]) < reach;
+      for (at[2] = -reach; at[2] <= reach; at[2] += inside ? 2 * reach : 1) {
+        if (put_away(r, v, from, unit, at)) {
+          return 1;
+        }
+      }
+    }
+  }
+  return 0;
+}
+
 static int nudge(rounding *r, int64_t v) {
   float *p = r->base + 3 * v, from[3] = {p[0], p[1], p[2]}, moved[2][3];
   int order[3];
@@ -130,6 +165,12 @@ static int nudge(rounding *r, int64_t v) {
       }
     }
   }
+  const float largest = fabsf(from[order[0]]), unit = nextafterf(largest, INFINITY) - largest;
+  for (int reach = 1; reach <= MAX_CUBE; reach++) {
+    if (nudge_within_cube(r, v, from, unit, reach)) {
+      return 1;
+    }
+  }
   return 0;
 }
 
@@ -146,6 +187,7 @@ static orb_status keep_apart(orb_context *ctx, rounding *r, const unsigned char 
                           "nearer to the origin or ask for fewer triangles.");
         }
         (*nudged)++;
+        ORB_TRY(orb_context_check(ctx));
       }
       if (v % CHECK_EVERY == 0) {
         ORB_TRY(orb_context_check(ctx));

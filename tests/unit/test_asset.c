@@ -1,4 +1,5 @@
 /* The asset: positions at every shape, normals and their splits, the animation, names, nudges. */
+#include <float.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -230,6 +231,45 @@ static void coinciding_vertices_are_kept_apart(void **state) {
   synthetic_free(ctx, &made);
 }
 
+/* Hundreds of vertices at one place on both shapes, as a very thin map makes them, are still written apart. */
+static void crowds_are_kept_apart(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 4, 2, ellipsoid);
+  const int crowd = 700;
+  const double place[3] = {0.5, 0.25, 0}; /* 0 has no units in the last place that glTF clients keep */
+  assert_true(made.shapes[0].mesh.vertex_count > crowd);
+  for (int s = 0; s < 2; s++) {
+    for (int v = 0; v < crowd; v++) {
+      memcpy(made.shapes[s].mesh.positions + 3 * (size_t)v, place, sizeof place);
+    }
+  }
+  orb_asset_options options;
+  orb_asset_defaults(&options);
+  orb_buffer bytes;
+  orb_asset_facts facts;
+  glb file = asset_write(ctx, &made, &options, &facts, &bytes);
+  assert_int_equal(facts.nudged_vertices, crowd - 1);
+  int base = glb_attribute(cJSON_GetObjectItem(asset_primitive(&file, 0), "attributes"), "POSITION"), near = 0;
+  for (int v = 0; v < glb_count(&file, base); v++) {
+    double from_crowd = 0;
+    for (int c = 0; c < 3; c++) {
+      from_crowd = fmax(from_crowd, fabs(glb_value(&file, base, v, c) - place[c]));
+    }
+    near += from_crowd <= 16 * 0.5 * FLT_EPSILON;
+    for (int w = 0; w < v && from_crowd < 1e-4; w++) {
+      int same = 1;
+      for (int c = 0; c < 3; c++) {
+        same &= glb_value(&file, base, v, c) == glb_value(&file, base, w, c);
+      }
+      assert_false(same);
+    }
+  }
+  assert_int_equal(near, crowd);
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  synthetic_free(ctx, &made);
+}
+
 /* The same bytes for one thread and for four. */
 static void threads_do_not_matter(void **state) {
   (void)state;
@@ -400,6 +440,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(animation_shows_every_shape_alone, asset_setup, asset_teardown),
       cmocka_unit_test_setup_teardown(hard_edges_split_vertices, asset_setup, asset_teardown),
       cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, asset_setup, asset_teardown),
+      cmocka_unit_test_setup_teardown(crowds_are_kept_apart, asset_setup, asset_teardown),
       cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, asset_setup, asset_teardown),
       cmocka_unit_test(threads_do_not_matter),
       cmocka_unit_test(running_out_of_memory_is_an_error),

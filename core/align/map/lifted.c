@@ -34,7 +34,6 @@ orb_status orb_map_lift(orb_map_run *c, const orb_map_level_map *copy) {
   int32_t flips = 0;
   orb_status status;
   orb_map_finish finish = {.hold = copy->lets_go ? 0 : c->params.copies.hold};
-  c->pairs.count = c->pairs.landmarks;
   orb_map_levels_adopt(c, copy->hierarchy);
   set_start(c, copy);
   ORB_GO(status, orb_map_levels_begin(c, &r), done);

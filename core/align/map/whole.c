@@ -86,6 +86,7 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                        .fixed = fixed,
                        .moving = moving,
                        .both = both,
+                       .may_mirror = !guide->target && guide->from != ORB_MAP_FROM_COPY,
                        .landmark_count = landmark_count,
                        .given_target = guide->target,
                        .keeps_angles = guide->keeps_angles,

@@ -65,9 +65,10 @@ typedef struct orb_asset_facts {
  * texture that bends normals get tangents, which morph like normals.
  *
  * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct. One of them
- * moves on the first shape: the one that is not a landmark, else the one with the higher number. It moves by as few
- * units in the last place of its largest coordinates as possible, at most 16. ORB_E_NOT_CERTIFIED if that does not
- * suffice.
+ * moves on the first shape: the one that is not a landmark, else the one with the higher number. It moves along one
+ * coordinate, by as few units in its last place as possible, at most 16, and if that does not suffice, along several,
+ * by at most 6 units in the last place of the largest one. ORB_E_NOT_CERTIFIED if even that does not: if thousands
+ * coincide.
  *
  * Errors: ORB_E_BAD_OPTION, ORB_E_TOO_LARGE (4 GiB), ORB_E_NO_MEMORY. Stage "write". O(V·N). */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh,

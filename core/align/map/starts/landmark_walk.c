@@ -52,7 +52,7 @@ orb_status orb_map_pairs_create(orb_map_run *c) {
     add_pair(p, c->moving->landmark_vertices[i], c->fixed->landmark_vertices[i]);
   }
   p->landmarks = p->count;
-  if (p->count > 0 && !c->given_target) { /* mirror landmarks would hold what the targets determine better */
+  if (p->count > 0 && c->may_mirror) {
     const orb_mesh *meshes[2] = {&c->fixed->mesh, &c->moving->mesh};
     const int32_t *landmarks[2] = {p->fixed, p->moving};
     ORB_GO(status, orb_map_mirror_landmarks(ctx, &c->params, meshes, landmarks, p->count, images, &found), done);
