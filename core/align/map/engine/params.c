@@ -99,7 +99,7 @@ static const orb_map_params DEFAULTS = {
               .weaker = 0.3,
               .least = 1.005,
               .most = 1.1},
-    .part = {.scale = 1.32, .spread = 1.4, .off = 0.05, .facing = 0.8, .least = 0.3, .most = 2.5},
+    .part = {.scale = 1.32, .spread = 1.4, .off = 0.05, .facing = 0.8, .least = 0.65, .most = 1.6},
     .near = {.few = 30,
              .rings = 12,
              .usable_rings = 4,
