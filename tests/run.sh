@@ -10,8 +10,8 @@
 #   fuzz       each fuzz target for ORB_FUZZ_SECONDS (3) of CPU time
 #   core       only the library and its unit tests, where the daemon does not build; not part of a full run
 #
-# In a full run the tests in a browser and those that mostly wait, each one at a time, run beside asan and
-# release, and so do the fuzz targets, in the time that the tests leave.
+# In a full run two chains run beside asan and release, each one test at a time: the tests in a browser, and those that
+# mostly wait. The fuzz targets run in the time that is left.
 #
 # A step that fails does not keep later steps from running. The last line is "N passed, N failed, N skipped", summed
 # over tests and fuzz targets; a step that fails outside a test counts as one failure. The exit status is 0 only if

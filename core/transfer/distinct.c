@@ -20,8 +20,7 @@
 #include "base/parallel.h"
 
 enum { MAX_ULPS = 16 }; /* units in the last place: more find a place in denser meshes and move vertices farther */
-/* The same along each of several coordinates: 13³ places. More would let a mesh of coincident vertices take as many
- * tries for each of them. */
+/* Units along each of several coordinates: a cube of 13³ places. A larger one would move vertices farther. */
 enum { MAX_CUBE = 6 };
 enum { GRAIN = 16384 };           /* vertices a thread takes at a time */
 enum { CHECK_EVERY = 16384 };     /* vertices between two checks for cancellation */
@@ -33,6 +32,7 @@ typedef struct rounding {
   float *base, *const *deltas;
   int32_t frame_count, shapes, vertex_count;
   int32_t *slots; /* the hash table: vertex numbers, −1 empty */
+  int32_t *tried; /* of each vertex: the tries of those that found its place taken, which they need not repeat */
   uint64_t mask;
 } rounding;
 
@@ -85,17 +85,32 @@ static int coincide(const rounding *r, int64_t a, int64_t b) {
   return 1;
 }
 
-/* Puts v into the table; 0 if its key is taken. */
-static int insert(rounding *r, int64_t v) {
+/* Puts v into the table. Returns −1, or the vertex that has its key. */
+static int32_t insert(rounding *r, int64_t v) {
   uint64_t slot = hash_of(r, v) & r->mask;
   while (r->slots[slot] >= 0) {
     if (coincide(r, v, r->slots[slot])) {
-      return 0;
+      return r->slots[slot];
     }
     slot = (slot + 1) & r->mask;
   }
   r->slots[slot] = (int32_t)v;
-  return 1;
+  return -1;
+}
+
+/* A vertex that looks for a place of its own. */
+typedef struct nudging {
+  int64_t v;
+  int32_t skip, tries; /* tries to skip, and those so far */
+} nudging;
+
+/* Puts the vertex where its base is, unless that is taken. */
+static int take_place(rounding *r, nudging *n) {
+  if (n->tries++ < n->skip) {
+    return 0;
+  }
+  round_deltas(r, n->v);
+  return insert(r, n->v) < 0;
 }
 
 /* The axes by falling magnitude of the coordinate. */
@@ -112,28 +127,26 @@ static void axis_order(const float p[3], int order[3]) {
   }
 }
 
-/* Puts v so many units away from a place where it was, if it finds a place of its own there. unit: that of the largest
- * coordinate, since a small one may be 0. */
-static int put_away(rounding *r, int64_t v, const float from[3], float unit, const int units[3]) {
-  float *p = r->base + 3 * v;
+/* Puts the vertex so many units away from where it was, unless that is taken. */
+static int put_away(rounding *r, nudging *n, const float from[3], float unit, const int units[3]) {
+  float *p = r->base + 3 * n->v;
   for (int c = 0; c < 3; c++) {
     p[c] = from[c] + (float)units[c] * unit + 0.0f;
     if (!isfinite(p[c]) || (units[c] != 0 && fabsf(p[c]) < TINY)) {
       return 0;
     }
   }
-  round_deltas(r, v);
-  return insert(r, v);
+  return take_place(r, n);
 }
 
 /* Tries the surface of the cube of 2·reach + 1 units. */
-static int nudge_within_cube(rounding *r, int64_t v, const float from[3], float unit, int reach) {
+static int nudge_within_cube(rounding *r, nudging *n, const float from[3], float unit, int reach) {
   int at[3];
   for (at[0] = -reach; at[0] <= reach; at[0]++) {
     for (at[1] = -reach; at[1] <= reach; at[1]++) {
       const int inside = abs(at[0]) < reach && abs(at[1]) < reach;
       for (at[2] = -reach; at[2] <= reach; at[2] += inside ? 2 * reach : 1) {
-        if (put_away(r, v, from, unit, at)) {
+        if (put_away(r, n, from, unit, at)) {
           return 1;
         }
       }
@@ -142,36 +155,44 @@ static int nudge_within_cube(rounding *r, int64_t v, const float from[3], float 
   return 0;
 }
 
-static int nudge(rounding *r, int64_t v) {
-  float *p = r->base + 3 * v, from[3] = {p[0], p[1], p[2]}, moved[2][3];
-  int order[3];
-  axis_order(from, order);
-  memcpy(moved[0], from, sizeof from);
-  memcpy(moved[1], from, sizeof from);
+/* Tries the places along one coordinate, the nearest first. */
+static int nudge_along(rounding *r, nudging *n, const float from[3], const int order[3]) {
+  float *p = r->base + 3 * n->v, moved[2][3];
+  memcpy(moved[0], from, sizeof moved[0]);
+  memcpy(moved[1], from, sizeof moved[1]);
   for (int step = 0; step < MAX_ULPS; step++) {
     for (int side = 0; side < 2; side++) {
       for (int i = 0; i < 3; i++) {
         int c = order[i];
         moved[side][c] = nextafterf(moved[side][c], side ? INFINITY : -INFINITY);
-        if (i > 0 && fabsf(moved[side][c]) < TINY) {
+        if (fabsf(moved[side][c]) < TINY) {
           continue;
         }
-        memcpy(p, from, sizeof from);
+        memcpy(p, from, 3 * sizeof *p);
         p[c] = moved[side][c] + 0.0f;
-        round_deltas(r, v);
-        if (isfinite(p[c]) && insert(r, v)) {
+        if (isfinite(p[c]) && take_place(r, n)) {
           return 1;
         }
       }
     }
   }
-  const float largest = fabsf(from[order[0]]), unit = nextafterf(largest, INFINITY) - largest;
-  for (int reach = 1; reach <= MAX_CUBE; reach++) {
-    if (nudge_within_cube(r, v, from, unit, reach)) {
-      return 1;
-    }
-  }
   return 0;
+}
+
+/* Finds a place for v, whose own is that of another vertex. The unit of a cube is that of the largest coordinate, since
+ * a small one may be 0. */
+static int nudge(rounding *r, int64_t v, int32_t other) {
+  const float from[3] = {r->base[3 * v], r->base[3 * v + 1], r->base[3 * v + 2]};
+  nudging n = {v, r->tried[other], 0};
+  int order[3];
+  axis_order(from, order);
+  const float largest = fabsf(from[order[0]]), unit = fmaxf(nextafterf(largest, INFINITY) - largest, TINY);
+  int found = nudge_along(r, &n, from, order);
+  for (int reach = 1; reach <= MAX_CUBE && !found; reach++) {
+    found = nudge_within_cube(r, &n, from, unit, reach);
+  }
+  r->tried[other] = n.tries;
+  return found;
 }
 
 static orb_status keep_apart(orb_context *ctx, rounding *r, const unsigned char *keep, int32_t *nudged) {
@@ -180,8 +201,9 @@ static orb_status keep_apart(orb_context *ctx, rounding *r, const unsigned char 
       if ((keep[v] != 0) != pass) {
         continue;
       }
-      if (!insert(r, v)) {
-        if (!nudge(r, v)) {
+      const int32_t other = insert(r, v);
+      if (other >= 0) {
+        if (!nudge(r, v, other)) {
           return orb_fail(ctx, ORB_E_NOT_CERTIFIED,
                           "Vertices of the supermesh coincide in every shape in 32-bit coordinates; move the shapes "
                           "nearer to the origin or ask for fewer triangles.");
@@ -215,23 +237,25 @@ static orb_status check_range(orb_context *ctx, const rounding *r) {
 orb_status orb_round_distinct(orb_context *ctx, double *const *positions, int32_t frame_count, int32_t shapes,
                               int32_t vertex_count, const unsigned char *keep, float *base, float *const *deltas,
                               int32_t *nudged) {
-  rounding r = {ctx, positions, base, deltas, frame_count, shapes, vertex_count, NULL, 0};
+  rounding r = {ctx, positions, base, deltas, frame_count, shapes, vertex_count, NULL, NULL, 0};
   uint64_t size = 64;
   while (size < 2 * (uint64_t)vertex_count) {
     size *= 2;
   }
   r.mask = size - 1;
   r.slots = ORB_NEW(ctx, int32_t, size);
-  if (!r.slots) {
-    return ORB_E_NO_MEMORY;
+  r.tried = ORB_NEW0(ctx, int32_t, vertex_count);
+  orb_status status = r.slots && r.tried ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
   }
   memset(r.slots, -1, size * sizeof *r.slots);
   *nudged = 0;
   orb_parallel_for(ctx, vertex_count, GRAIN, round_body, &r);
-  orb_status status = check_range(ctx, &r);
-  if (status == ORB_OK) {
-    status = keep_apart(ctx, &r, keep, nudged);
-  }
+  ORB_GO(status, check_range(ctx, &r), done);
+  status = keep_apart(ctx, &r, keep, nudged);
+done:
   orb_free(ctx, r.slots);
+  orb_free(ctx, r.tried);
   return status;
 }

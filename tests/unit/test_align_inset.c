@@ -324,7 +324,7 @@ static void landmarks_in_a_row_fix_no_turn(void **state) {
   static const given row[] = {{BOTH(1, 0, 0), 0}, {BOTH(0.9, 0.3, 0.3), 0}, {BOTH(0.9, -0.3, -0.3), 0}};
   static const given same[] = {{BOTH(0, 0.98, 0.2), 0}, {BOTH(0, 0.98, 0.2), 0}, {BOTH(0, 0.98, 0.2), 0}};
   if (IS_SLOW) {
-    skip();
+    skip(); /* one landmark takes the same way */
   }
   assert_true(off_with(0, row, 3, ORB_PRESET_DEFAULT) < 0.3);
   assert_true(off_with(0, same, 3, ORB_PRESET_DEFAULT) < 0.3);

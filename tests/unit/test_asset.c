@@ -231,42 +231,69 @@ static void coinciding_vertices_are_kept_apart(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* Hundreds of vertices at one place on both shapes, as a very thin map makes them, are still written apart. */
-static void crowds_are_kept_apart(void **state) {
-  orb_context *ctx = *state;
-  synthetic made = synthetic_make(ctx, 4, 2, ellipsoid);
-  const int crowd = 700;
-  const double place[3] = {0.5, 0.25, 0}; /* 0 has no units in the last place that glTF clients keep */
+/* Two shapes of which the first `crowd` vertices are at one place. */
+static synthetic make_crowd(orb_context *ctx, int crowd, const double place[3]) {
+  synthetic made = synthetic_make(ctx, 5, 2, ellipsoid);
   assert_true(made.shapes[0].mesh.vertex_count > crowd);
   for (int s = 0; s < 2; s++) {
     for (int v = 0; v < crowd; v++) {
-      memcpy(made.shapes[s].mesh.positions + 3 * (size_t)v, place, sizeof place);
+      memcpy(made.shapes[s].mesh.positions + 3 * (size_t)v, place, 3 * sizeof *place);
     }
   }
+  return made;
+}
+
+/* Hundreds of vertices at one place on both shapes, as a very thin map makes them, are still written apart, also where
+ * coordinates are 0, which has no units in the last place that clients keep. */
+static void crowds_are_kept_apart(void **state) {
+  orb_context *ctx = *state;
+  static const double places[2][3] = {{0.5, 0.25, 0}, {0, 0, 0}};
+  enum { CROWD = 700 };
+  for (int i = 0; i < 2; i++) {
+    synthetic made = make_crowd(ctx, CROWD, places[i]);
+    orb_asset_options options;
+    orb_asset_defaults(&options);
+    orb_buffer bytes;
+    orb_asset_facts facts;
+    glb file = asset_write(ctx, &made, &options, &facts, &bytes);
+    assert_int_equal(facts.nudged_vertices, CROWD - 1);
+    int base = glb_attribute(cJSON_GetObjectItem(asset_primitive(&file, 0), "attributes"), "POSITION"), near = 0;
+    double at[CROWD][3];
+    for (int v = 0; v < glb_count(&file, base); v++) {
+      double off = 0;
+      for (int c = 0; c < 3; c++) {
+        off = fmax(off, fabs(glb_value(&file, base, v, c) - places[i][c]));
+      }
+      if (off <= 16 * 0.5 * FLT_EPSILON) {
+        assert_true(near < CROWD);
+        for (int c = 0; c < 3; c++) {
+          at[near][c] = glb_value(&file, base, v, c);
+          assert_true(at[near][c] == 0 || fabs(at[near][c]) > FLT_MIN);
+        }
+        for (int w = 0; w < near; w++) {
+          assert_memory_not_equal(at[w], at[near], sizeof at[w]);
+        }
+        near++;
+      }
+    }
+    assert_int_equal(near, CROWD);
+    glb_close(&file);
+    orb_buffer_free(ctx, &bytes);
+    synthetic_free(ctx, &made);
+  }
+}
+
+/* Thousands find no place near enough. */
+static void larger_crowds_are_refused(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = make_crowd(ctx, 2400, (const double[3]){0.5, 0.25, 0});
   orb_asset_options options;
   orb_asset_defaults(&options);
   orb_buffer bytes;
   orb_asset_facts facts;
-  glb file = asset_write(ctx, &made, &options, &facts, &bytes);
-  assert_int_equal(facts.nudged_vertices, crowd - 1);
-  int base = glb_attribute(cJSON_GetObjectItem(asset_primitive(&file, 0), "attributes"), "POSITION"), near = 0;
-  for (int v = 0; v < glb_count(&file, base); v++) {
-    double from_crowd = 0;
-    for (int c = 0; c < 3; c++) {
-      from_crowd = fmax(from_crowd, fabs(glb_value(&file, base, v, c) - place[c]));
-    }
-    near += from_crowd <= 16 * 0.5 * FLT_EPSILON;
-    for (int w = 0; w < v && from_crowd < 1e-4; w++) {
-      int same = 1;
-      for (int c = 0; c < 3; c++) {
-        same &= glb_value(&file, base, v, c) == glb_value(&file, base, w, c);
-      }
-      assert_false(same);
-    }
-  }
-  assert_int_equal(near, crowd);
-  glb_close(&file);
-  orb_buffer_free(ctx, &bytes);
+  assert_int_equal(orb_asset_write(ctx, &made.supermesh, made.shapes, asset_names, &options, &facts, &bytes),
+                   ORB_E_NOT_CERTIFIED);
+  assert_non_null(strstr(orb_context_error(ctx)->detail, "coincide"));
   synthetic_free(ctx, &made);
 }
 
@@ -441,6 +468,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(hard_edges_split_vertices, asset_setup, asset_teardown),
       cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, asset_setup, asset_teardown),
       cmocka_unit_test_setup_teardown(crowds_are_kept_apart, asset_setup, asset_teardown),
+      cmocka_unit_test_setup_teardown(larger_crowds_are_refused, asset_setup, asset_teardown),
       cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, asset_setup, asset_teardown),
       cmocka_unit_test(threads_do_not_matter),
       cmocka_unit_test(running_out_of_memory_is_an_error),

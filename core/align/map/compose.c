@@ -201,11 +201,8 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   return run_starts(c, from, preset);
 }
 
-/* Optimises the map as given, which keeps its limbs where they are. Drops mirror landmarks: they would hold what must
- * be let go.
- */
+/* Optimises the map as given, which keeps its limbs where they are. */
 static orb_status let_go(orb_map_run *c) {
-  c->pairs.count = c->pairs.landmarks;
   c->params.work.rough = 0;
   ORB_TRY(orb_map_levels_prepare(c));
   return orb_map_run_start(c, ORB_MAP_GIVEN);

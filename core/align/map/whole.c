@@ -77,6 +77,12 @@ orb_status orb_map_run_prepare(orb_map_run *c) {
   return orb_tasks_run(c->ctx, 2, prepare_one, c);
 }
 
+/* Mirror landmarks would hold what targets determine better, and what a finished map has or must let go. */
+static int may_mirror(const orb_map_guide *guide) {
+  const orb_map_from from = guide->from;
+  return !guide->target && (from == ORB_MAP_FROM_SPACE || from == ORB_MAP_FROM_MAP || from == ORB_MAP_FROM_WALK);
+}
+
 /* A run of these two shapes. */
 orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                            int32_t landmark_count, const orb_map_guide *guide, orb_preset preset) {
@@ -86,7 +92,7 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                        .fixed = fixed,
                        .moving = moving,
                        .both = both,
-                       .may_mirror = !guide->target && guide->from != ORB_MAP_FROM_COPY,
+                       .may_mirror = may_mirror(guide),
                        .landmark_count = landmark_count,
                        .given_target = guide->target,
                        .keeps_angles = guide->keeps_angles,

@@ -266,9 +266,10 @@ typedef struct orb_map_params {
     double facing; /* least cosine between its normal and that of the fixed shape there. Not varied */
     double least;  /* share of the part's vertices that fit; less is no part. Real heads and busts have 0.7 and more, 54
                       generated ones 0.86. With 5 landmarks, distances misled in 5 of 84 pairs of other animals (seed
-                      31):  four of these have 0.33 to 0.64 */
-    double most; /* energy after, relative to before, that is still taken: theirs rises by a half at most, by a seventh
-                    where generated; that of the misled ones to 1.7, 1.9, 2.1 and 2.5 times, and of one by a tenth */
+                      31): four of these have 0.33 to 0.64 */
+    double most; /* energy after, relative to before, that is still taken. That of real heads and busts rises by a half
+                    at most, that of generated ones by a seventh; of the five misled pairs to 1.1, 1.7, 1.9, 2.1 and
+                    2.5 times */
   } part;
 
   /* Drawing a level without flips to its spatial targets. */

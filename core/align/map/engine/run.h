@@ -51,11 +51,10 @@ typedef struct orb_map_run {
   orb_aligned_shape *moving;
   int32_t vertex_count, landmark_count;
   orb_map_pairs pairs;
-  orb_map_samples samples; /* by eigenfunctions */
-  orb_map_springs springs; /* the caller's */
-  int may_mirror; /* mirror landmarks join the pairs: not with given targets, which determine better what they would
-                     hold, nor on a copy's map, which is finished */
-  int both;       /* the fixed shape's points on the sphere may change too */
+  orb_map_samples samples;        /* by eigenfunctions */
+  orb_map_springs springs;        /* the caller's */
+  int may_mirror;                 /* mirror landmarks join the pairs */
+  int both;                       /* the fixed shape's points on the sphere may change too */
   double *fixed_points;           /* what they are now; NULL: as given */
   orb_map_candidate kept;         /* the best map from before they changed */
   double *x, *normal;             /* moving shape, area 4π */

@@ -5,7 +5,7 @@
 #include "align/map/engine/run.h"
 #include "align/pin/walk.h"
 
-/* Fills run->pairs: the landmarks, then the mirror landmarks. */
+/* Fills run->pairs: the landmarks, then, if run->may_mirror, the mirror landmarks. */
 ORB_MUST_CHECK orb_status orb_map_pairs_create(orb_map_run *run);
 
 /* Embeds both shapes anew so that all pairs meet, and with them at most `samples` samples of the spatial targets, or of
