@@ -182,10 +182,14 @@ static void keep_common(const posed_place *place[2], int samples, body bodies[2]
   }
 }
 
+/* What names a generated body. build: "", or how its proportions differ. */
+typedef struct named_body {
+  const char *kind, *build, *pose;
+} named_body;
+
 /* The mean errors between two bodies, relative to the diagonal: without landmarks, and with the first true places,
  * FEW at most. Returns the energy with them. */
-static double errors_of(const char *const kind[2], const char *const build[2], const char *const pose[2], int few,
-                        double error[2]) {
+static double errors_of(const named_body of[2], int few, double error[2]) {
   double energy = 0;
   const int samples = posed_sample_count();
   posed_place *place[2];
@@ -195,7 +199,7 @@ static double errors_of(const char *const kind[2], const char *const build[2], c
   for (int s = 0; s < 2; s++) {
     place[s] = calloc((size_t)samples, sizeof **place);
     assert_non_null(place[s]);
-    generate(ctx, kind[s], build[s], pose[s], (unsigned)s + 1, &bodies[s], place[s]);
+    generate(ctx, of[s].kind, of[s].build, of[s].pose, (unsigned)s + 1, &bodies[s], place[s]);
   }
   keep_common((const posed_place *[2]){place[0], place[1]}, samples, bodies);
   assert_true(bodies[0].count > 100 && few <= FEW);
@@ -224,8 +228,8 @@ static double errors_of(const char *const kind[2], const char *const build[2], c
     energy = out.energy;
     orb_alignment_free(ctx, &out);
   }
-  print_message("%s and %s: error without landmarks %.4f, with %d of them %.4f\n", kind[0], kind[1], error[0], few,
-                error[1]);
+  print_message("%s and %s: error without landmarks %.4f, with %d of them %.4f\n", of[0].kind, of[1].kind, error[0],
+                few, error[1]);
   free(place[0]);
   free(place[1]);
   unload(ctx, bodies);
@@ -316,9 +320,9 @@ static orb_match_facts match_of_cow_and_giraffe(int is_fine) {
  * onto it, and has half of the energy that the triangles of the whole giraffe have afterwards. */
 static void finer_triangles_are_as_sure(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* test_align_large runs the same code */
-#endif
+  if (IS_SLOW) {
+    skip(); /* test_align_large runs the same code */
+  }
   const orb_match_facts coarse = match_of_cow_and_giraffe(0), fine = match_of_cow_and_giraffe(1);
   assert_true(coarse.is_measured && fine.is_measured);
   assert_true(fabs(coarse.confidence - fine.confidence) <= 0.2);
@@ -328,8 +332,7 @@ static void finer_triangles_are_as_sure(void **state) {
 static void few_true_landmarks_do_not_spoil_a_match(void **state) {
   (void)state;
   double error[2];
-  (void)errors_of((const char *const[2]){"giraffe", "giraffe"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"stand", "run"}, FEW, error);
+  (void)errors_of((named_body[2]){{"giraffe", "", "stand"}, {"giraffe", "", "run"}}, FEW, error);
   assert_true(error[0] <= 0.008);
   assert_true(error[1] <= 1.05 * error[0]);
 }
@@ -338,12 +341,11 @@ static void few_true_landmarks_do_not_spoil_a_match(void **state) {
  * If it did not slide then, its error would be 0.0071. */
 static void maps_on_the_given_spheres_slide(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* the giraffe runs the same code */
-#endif
+  if (IS_SLOW) {
+    skip(); /* the giraffe runs the same code */
+  }
   double error[2];
-  (void)errors_of((const char *const[2]){"person", "person"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"walk", "turn"}, FEW, error);
+  (void)errors_of((named_body[2]){{"person", "", "walk"}, {"person", "", "turn"}}, FEW, error);
   assert_true(error[0] <= 0.006);
   assert_true(error[1] <= 0.006);
 }
@@ -352,15 +354,13 @@ static void maps_on_the_given_spheres_slide(void **state) {
  */
 static void landmarks_on_a_part_place_that_part(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* test_align_inset runs the same code */
-#endif
+  if (IS_SLOW) {
+    skip(); /* test_align_inset runs the same code */
+  }
   double error[2];
-  (void)errors_of((const char *const[2]){"head", "bust"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"stand", "stand"}, FEW, error);
+  (void)errors_of((named_body[2]){{"head", "", "stand"}, {"bust", "", "stand"}}, FEW, error);
   assert_true(error[1] <= 0.035);
-  (void)errors_of((const char *const[2]){"bust", "head"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"look", "nod"}, FEW, error);
+  (void)errors_of((named_body[2]){{"bust", "", "look"}, {"head", "", "nod"}}, FEW, error);
   assert_true(error[1] <= 0.055);
 }
 
@@ -368,12 +368,11 @@ static void landmarks_on_a_part_place_that_part(void **state) {
  * either shape may move, and the map is as good as without landmarks. */
 static void landmarks_of_other_kinds_use_a_match(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* the contest of creatures runs the same code */
-#endif
+  if (IS_SLOW) {
+    skip(); /* the contest of creatures runs the same code */
+  }
   double error[2];
-  const double energy = errors_of((const char *const[2]){"person", "elephant"}, (const char *const[2]){"", ""},
-                                  (const char *const[2]){"walk", "stand"}, FEW, error);
+  const double energy = errors_of((named_body[2]){{"person", "", "walk"}, {"elephant", "", "stand"}}, FEW, error);
   assert_true(energy <= 1.8);
   assert_true(error[1] <= error[0]);
 }
@@ -382,12 +381,11 @@ static void landmarks_of_other_kinds_use_a_match(void **state) {
  * of 0.043, with an energy that right maps may have. */
 static void few_landmarks_of_other_kinds_use_a_match(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* the contest of creatures runs the same code */
-#endif
+  if (IS_SLOW) {
+    skip(); /* the contest of creatures runs the same code */
+  }
   double error[2];
-  (void)errors_of((const char *const[2]){"dog", "elephant"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"walk", "stand"}, FEWER, error);
+  (void)errors_of((named_body[2]){{"dog", "", "walk"}, {"elephant", "", "stand"}}, FEWER, error);
   assert_true(error[1] <= 0.035);
 }
 
@@ -395,12 +393,11 @@ static void few_landmarks_of_other_kinds_use_a_match(void **state) {
  * much of it fits there, and a map that is drawn there has an energy of 4. */
 static void other_kinds_are_no_parts(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* the contest of creatures runs the same code */
-#endif
+  if (IS_SLOW) {
+    skip(); /* the contest of creatures runs the same code */
+  }
   double error[2];
-  const double energy = errors_of((const char *const[2]){"elephant", "giraffe"}, (const char *const[2]){"slim", ""},
-                                  (const char *const[2]){"graze", "run"}, FEWER, error);
+  const double energy = errors_of((named_body[2]){{"elephant", "slim", "graze"}, {"giraffe", "", "run"}}, FEWER, error);
   assert_true(energy <= 2);
   assert_true(error[1] <= 0.06);
 }
@@ -409,21 +406,20 @@ static void other_kinds_are_no_parts(void **state) {
  * of 0.1. */
 static void one_landmark_keeps_the_match(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* the contest of creatures runs the same code */
-#endif
+  if (IS_SLOW) {
+    skip(); /* the contest of creatures runs the same code */
+  }
   double error[2];
-  (void)errors_of((const char *const[2]){"cow", "horse"}, (const char *const[2]){"", ""},
-                  (const char *const[2]){"run", "turn"}, ONE, error);
+  (void)errors_of((named_body[2]){{"cow", "", "run"}, {"horse", "", "turn"}}, ONE, error);
   assert_true(error[1] <= 0.02);
 }
 
 /* One body is twisted. A match that exchanges left with right and front with back would move places by half a body. */
 static void a_twist_is_matched(void **state) {
   (void)state;
-#ifdef __SANITIZE_ADDRESS__
-  skip(); /* it takes a minute, and other tests run the same code with sanitizers */
-#endif
+  if (IS_SLOW) {
+    skip(); /* it takes a minute, and other tests run the same code with sanitizers */
+  }
   body bodies[2];
   orb_context *ctx = load_or_skip((const char *const[2]){"dan-neutral.obj", "dan-twist.obj"},
                                   (const char *const[2]){"dan-neutral.truth.csv", "dan-twist.truth.csv"}, bodies);

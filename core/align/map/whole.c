@@ -77,12 +77,6 @@ orb_status orb_map_run_prepare(orb_map_run *c) {
   return orb_tasks_run(c->ctx, 2, prepare_one, c);
 }
 
-/* Mirror landmarks would hold what targets determine better, and what a finished map has or must let go. */
-static int may_mirror(const orb_map_guide *guide) {
-  const orb_map_from from = guide->from;
-  return !guide->target && (from == ORB_MAP_FROM_SPACE || from == ORB_MAP_FROM_MAP || from == ORB_MAP_FROM_WALK);
-}
-
 /* A run of these two shapes. */
 orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                            int32_t landmark_count, const orb_map_guide *guide, orb_preset preset) {
@@ -92,7 +86,6 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                        .fixed = fixed,
                        .moving = moving,
                        .both = both,
-                       .may_mirror = may_mirror(guide),
                        .landmark_count = landmark_count,
                        .given_target = guide->target,
                        .keeps_angles = guide->keeps_angles,
@@ -122,6 +115,12 @@ typedef struct opening {
 
 enum { OPEN_TARGET, OPEN_PACKED, OPEN_ENERGY, OPEN_PAIRS, OPENINGS }; /* the longest comes first */
 
+/* Mirror landmarks would hold what targets determine better, and what a finished map has or must let go. */
+static int may_mirror(const orb_map_guide *guide) {
+  const orb_map_from from = guide->from;
+  return !guide->target && (from == ORB_MAP_FROM_SPACE || from == ORB_MAP_FROM_MAP || from == ORB_MAP_FROM_WALK);
+}
+
 static orb_status open_one(orb_context *ctx, void *arg, int32_t what) {
   opening *o = arg;
   orb_map_run *c = o->run;
@@ -134,7 +133,7 @@ static orb_status open_one(orb_context *ctx, void *arg, int32_t what) {
   }
   if (what == OPEN_PAIRS) {
     o->paired.ctx = ctx;
-    return orb_map_pairs_create(&o->paired);
+    return orb_map_pairs_create(&o->paired, may_mirror(o->guide));
   }
   o->measured.ctx = ctx;
   return o->guide->from == ORB_MAP_FROM_COPY

@@ -284,8 +284,7 @@ static void measure_areas(void *arg, int64_t begin, int64_t end, int thread) {
   double sum = 0;
   for (int64_t t = begin; t < end; t++) {
     const int32_t *v = s->corner + orb_triangle_corner(t);
-    double area = orb_triangle_area(s->position + 3 * (int64_t)v[0], s->position + 3 * (int64_t)v[1],
-                                    s->position + 3 * (int64_t)v[2]);
+    double area = orb_triangle_area_at(s->position, v);
     orb_corner_set_area(w->s, orb_triangle_corner(t), (float)area);
     sum += area;
   }

@@ -53,7 +53,6 @@ typedef struct orb_map_run {
   orb_map_pairs pairs;
   orb_map_samples samples;        /* by eigenfunctions */
   orb_map_springs springs;        /* the caller's */
-  int may_mirror;                 /* mirror landmarks join the pairs */
   int both;                       /* the fixed shape's points on the sphere may change too */
   double *fixed_points;           /* what they are now; NULL: as given */
   orb_map_candidate kept;         /* the best map from before they changed */

@@ -35,7 +35,7 @@ static void add_pair(orb_map_pairs *p, int32_t moving, int32_t fixed) {
   }
 }
 
-orb_status orb_map_pairs_create(orb_map_run *c) {
+orb_status orb_map_pairs_create(orb_map_run *c, int mirrors) {
   orb_context *ctx = c->ctx;
   orb_status status = ORB_OK;
   orb_map_pairs *p = &c->pairs;
@@ -52,7 +52,7 @@ orb_status orb_map_pairs_create(orb_map_run *c) {
     add_pair(p, c->moving->landmark_vertices[i], c->fixed->landmark_vertices[i]);
   }
   p->landmarks = p->count;
-  if (p->count > 0 && c->may_mirror) {
+  if (p->count > 0 && mirrors) {
     const orb_mesh *meshes[2] = {&c->fixed->mesh, &c->moving->mesh};
     const int32_t *landmarks[2] = {p->fixed, p->moving};
     ORB_GO(status, orb_map_mirror_landmarks(ctx, &c->params, meshes, landmarks, p->count, images, &found), done);

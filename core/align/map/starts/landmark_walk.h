@@ -5,8 +5,8 @@
 #include "align/map/engine/run.h"
 #include "align/pin/walk.h"
 
-/* Fills run->pairs: the landmarks, then, if run->may_mirror, the mirror landmarks. */
-ORB_MUST_CHECK orb_status orb_map_pairs_create(orb_map_run *run);
+/* Fills run->pairs: the landmarks, then, if `mirrors`, the mirror landmarks. */
+ORB_MUST_CHECK orb_status orb_map_pairs_create(orb_map_run *run, int mirrors);
 
 /* Embeds both shapes anew so that all pairs meet, and with them at most `samples` samples of the spatial targets, or of
  * the usable part of a start. Sets run->start to the result. If run->both, also replaces the fixed shape's sphere;
