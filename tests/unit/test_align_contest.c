@@ -221,7 +221,59 @@ static void landmarks_meet(void **unused) {
   }
 }
 
+/* Aligns two creatures in this order of the shapes, without landmarks. */
+static void align_in_order(orb_context *ctx, const orb_align_shape shapes[2], int first, orb_alignment *out) {
+  const orb_align_shape ordered[2] = {shapes[first], shapes[1 - first]};
+  orb_align_options options;
+  orb_align_defaults(&options);
+  options.method = ORB_ALIGN_AUTO;
+  options.preset = ORB_PRESET_DEFAULT;
+  align_and_check(ctx, ordered, 2, NULL, 0, &options, out);
+}
+
+/* Whoever swaps two shapes gets the same map and the same alternatives. */
+static void order_changes_nothing(void **unused) {
+  (void)unused;
+  if (IS_SLOW) {
+    skip(); /* the other tests run the same code */
+  }
+  orb_context *ctx;
+  orb_mesh mesh[2];
+  orb_embedding embedding[2];
+  orb_align_shape shapes[2];
+  orb_alignment out[2];
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  make_creatures(ctx, 0, mesh, embedding, shapes);
+  for (int first = 0; first < 2; first++) {
+    align_in_order(ctx, shapes, first, &out[first]);
+  }
+  assert_true(out[0].energy == out[1].energy);
+  assert_memory_equal(&out[0].match, &out[1].match, sizeof out[0].match);
+  for (int s = 0; s < 2; s++) {
+    assert_memory_equal(out[0].shapes[s].points, out[1].shapes[1 - s].points,
+                        3 * (size_t)mesh[s].vertex_count * sizeof(double));
+  }
+  assert_true(out[0].alternative_count > 0);
+  assert_int_equal(out[0].alternative_count, out[1].alternative_count);
+  for (int32_t i = 0; i < out[0].alternative_count; i++) {
+    const orb_alternative *a = &out[0].alternatives[i], *b = &out[1].alternatives[i];
+    assert_true(a->cost == b->cost && a->shape == 1 && b->shape == 1);
+    assert_int_equal(a->count, b->count);
+    for (int32_t k = 0; k < 2 * a->count; k++) {
+      assert_int_equal(a->at[k].triangle, b->at[k ^ 1].triangle);
+      assert_memory_equal(a->at[k].at, b->at[k ^ 1].at, sizeof a->at[k].at);
+    }
+  }
+  for (int s = 0; s < 2; s++) {
+    orb_alignment_free(ctx, &out[s]);
+    orb_embedding_free(ctx, &embedding[s]);
+    shape_free(ctx, &mesh[s]);
+  }
+  orb_context_destroy(ctx);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(landmarks_meet)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(order_changes_nothing),
+                                     cmocka_unit_test(landmarks_meet)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
