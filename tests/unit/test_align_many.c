@@ -156,7 +156,10 @@ static void same_for_any_threads(void **state) {
     int marks;
   } tried[] = {{ORB_ALIGN_AUTO, 0}, {ORB_ALIGN_PIN, 3}, {ORB_ALIGN_PIN, MARKS}};
   (void)state;
-  for (size_t i = IS_SLOW ? 2 : 0; i < sizeof tried / sizeof *tried; i++) {
+  for (size_t i = 0; i < sizeof tried / sizeof *tried; i++) {
+    if (IS_SLOW && i == 1) {
+      continue; /* the last one runs the same code */
+    }
     orb_alignment out[THREAD_COUNTS];
     crowd c[THREAD_COUNTS];
     for (int t = 0; t < THREAD_COUNTS; t++) {

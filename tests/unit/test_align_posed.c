@@ -345,7 +345,7 @@ static void few_true_landmarks_do_not_spoil_a_match(void **state) {
 static void maps_on_the_given_spheres_slide(void **state) {
   (void)state;
   if (IS_SLOW) {
-    skip(); /* the contest of creatures runs the same code */
+    skip(); /* the crowds of test_align_many begin on their given spheres too */
   }
   double error[2];
   (void)errors_of((named_body[2]){{"person", "", "walk"}, {"person", "", "turn"}}, FEW, error);

@@ -46,7 +46,7 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
     ORB_TRY(orb_certify(ctx, shape->points, shape->mesh.vertex_count, shape->mesh.triangles, shape->mesh.triangle_count,
                         &shape->certificate));
     if (!shape->certificate.valid) {
-      orb_status status = orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The alignment of shape %d is not certified.", s);
+      orb_status status = orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The alignment of a shape is not certified.");
       orb_context_error_edit(ctx)->shape = s;
       return status;
     }

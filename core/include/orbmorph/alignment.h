@@ -98,7 +98,7 @@ typedef struct orb_rim_match {
   int32_t hole[2];
   int32_t edges[2];          /* of the rims, in the files */
   double length_relative[2]; /* of the rims, to the diagonals */
-  double off_relative; /* the most that a vertex of the first rim is away from the second one on the later shape, to its
+  double off_relative; /* the most that a vertex of one rim is away from the other rim, on one of the two shapes, to its
                           diagonal; 0 up to rounding where all points of the rims meet */
 } orb_rim_match;
 

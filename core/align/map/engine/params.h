@@ -148,7 +148,9 @@ typedef struct orb_map_params {
     int work;    /* least work of each guided walk, as work.all */
     int32_t guides[ORB_MAP_GUIDED];  /* samples of the spatial targets that guide one walk each, spread over the moving
                          shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
-                         walk get stuck, and which is best is close to chance */
+                         walk get stuck, and which is best is close to chance. With three at most, 161 of 168 pairs of
+                         animals of other kinds are right as with six (seeds 17 and 31), with 0.2 % more energy in
+                         2 % less time */
     int32_t few[ORB_MAP_GUIDED_FEW]; /* the same if none of these led to a map: a blade has no room for more */
     double enough;                   /* energy of a coarse map up to which no further walk is tried */
     double refines; /* coarse energy, as a multiple of that of the best map, below which it is refined: of
