@@ -193,12 +193,21 @@ static void soft_landmarks_are_let_go(void **state) {
   close_scene(&s);
 }
 
-/* Found landmarks and alternatives are places on the given meshes, not on the copies. */
+/* Found landmarks and alternatives are places on the given meshes, not on the copies. The first shape is stretched, so
+ * the search begins at it, and a copy stands for the second one. */
 static void whole_shapes_have_the_places(void **state) {
   (void)state;
   scene s;
   orb_alignment a;
+  orb_extent extent[2];
   open_scene(&s);
+  for (int32_t v = 0; v < s.mesh[0].vertex_count; v++) {
+    s.mesh[0].positions[3 * (size_t)v + 2] *= 1.01;
+  }
+  for (int k = 0; k < 2; k++) {
+    orb_mesh_extent(&s.mesh[k], &extent[k]);
+  }
+  assert_true(extent[0].volume / pow(extent[0].area, 1.5) < extent[1].volume / pow(extent[1].area, 1.5));
   const orb_align_options options = options_of(ORB_ALIGN_AUTO);
   align_and_check(s.ctx, s.shape, 2, NULL, 0, &options, &a);
   check_map(&s, &a, 2);

@@ -133,10 +133,8 @@ static void align_pair(const orb_mesh mesh[2], const orb_embedding embedding[2],
 }
 
 /* Aligns two shapes; as many rims as `expected` match, each vertex of the first rims lies on the second ones where no
- * hole is left over, and the found landmarks are on the given meshes. Returns the energy, and adds the edges of the
- * rims. */
-static double check_pair(const open_ball *first, const open_ball *second, int expected, double energy, const char *what,
-                         int32_t edges[2]) {
+ * hole is left over, and the found landmarks are on the given meshes. */
+static void check_pair(const open_ball *first, const open_ball *second, int expected, double energy, const char *what) {
   orb_mesh mesh[2];
   orb_embedding embedding[2];
   orb_alignment aligned;
@@ -151,10 +149,7 @@ static double check_pair(const open_ball *first, const open_ball *second, int ex
   for (int32_t i = 0; i < aligned.rim_count; i++) {
     assert_int_equal(aligned.rims[i].shape, 1);
     assert_true(aligned.rims[i].off_relative <= NEAR);
-    edges[0] += aligned.rims[i].edges[0];
-    edges[1] += aligned.rims[i].edges[1];
   }
-  const double found_energy = aligned.energy;
   assert_int_equal(aligned.landmark_count, 0);
   for (int32_t i = 0; i < aligned.found_count * 2; i++) {
     assert_true(aligned.found[i].triangle < mesh[i % 2].triangle_count);
@@ -164,7 +159,6 @@ static double check_pair(const open_ball *first, const open_ball *second, int ex
     orb_embedding_free(ctx, &embedding[s]);
     orb_mesh_free(ctx, &mesh[s]);
   }
-  return found_energy;
 }
 
 static const open_ball BUSTS[2] = {{1, {{0, -1, 0}}, {35}, {1, 1.3, 0.8}, 0},
@@ -175,31 +169,22 @@ static const open_ball MASKS[2] = {
     {4, {{0, 0, -1}, {-0.4, 0.3, 1}, {0.4, 0.35, 1}, {0, -0.5, 1}}, {72, 11, 12, 12}, {1, 1.3, 0.8}, 0.1},
     {4, {{0, 0, -1}, {-0.4, 0.3, 1}, {0.4, 0.45, 1}, {0, -0.5, 1}}, {56, 13, 12, 16}, {1, 1.3, 0.8}, 0.3}};
 
-/* Both orders of two shapes have the same map, and the same rims match. */
-static void check_orders(const open_ball *first, const open_ball *second, int expected, const char *what) {
-  int32_t edges[2] = {0}, swapped[2] = {0};
-  const double energy = check_pair(first, second, expected, 1.5, what, edges);
-  if (!IS_SLOW) {
-    assert_true(check_pair(second, first, expected, 1.5, "the other way", swapped) == energy);
-    assert_true(edges[0] == swapped[1] && edges[1] == swapped[0]);
-  }
-}
-
 static void test_busts(void **state) {
   (void)state;
-  check_orders(&BUSTS[0], &BUSTS[1], 1, "busts");
+  check_pair(&BUSTS[0], &BUSTS[1], 1, 1.5, "busts");
+  if (!IS_SLOW) {
+    check_pair(&BUSTS[1], &BUSTS[0], 1, 1.5, "busts, the other way");
+  }
 }
 
 static void test_tubes(void **state) {
   (void)state;
-  int32_t edges[2] = {0};
-  (void)check_pair(&TUBES[0], &TUBES[1], 2, 1.5, "tubes", edges);
+  check_pair(&TUBES[0], &TUBES[1], 2, 1.5, "tubes");
 }
 
 static void test_masks(void **state) {
   (void)state;
-  int32_t edges[2] = {0};
-  (void)check_pair(&MASKS[0], &MASKS[1], 4, 1.5, "masks", edges);
+  check_pair(&MASKS[0], &MASKS[1], 4, 1.5, "masks");
 }
 
 /* A mask without a mouth has no counterpart of the mouth. */
@@ -207,7 +192,10 @@ static void test_left_over(void **state) {
   (void)state;
   open_ball mute = MASKS[1];
   mute.caps = 3;
-  check_orders(&MASKS[0], &mute, 3, "mask and mask without a mouth");
+  check_pair(&MASKS[0], &mute, 3, 1.5, "mask and mask without a mouth");
+  if (!IS_SLOW) {
+    check_pair(&mute, &MASKS[0], 3, 1.5, "the other way");
+  }
 }
 
 /* Nothing is matched where only one shape has holes. */
@@ -215,8 +203,7 @@ static void test_one_open(void **state) {
   (void)state;
   open_ball whole = BUSTS[1];
   whole.caps = 0;
-  int32_t edges[2] = {0};
-  (void)check_pair(&BUSTS[0], &whole, 0, 1.5, "bust and whole ball", edges);
+  check_pair(&BUSTS[0], &whole, 0, 1.5, "bust and whole ball");
 }
 
 static void test_holes(void **state) {

@@ -11,7 +11,7 @@ extern "C" {
 ORB_API void orb_align_defaults(orb_align_options *options);
 
 /* Aligns shape_count ≥ 1 shapes. The points of the first shape stay as they are unless the method says otherwise. Every
- * result is certified. pin and auto, with any preset but fast, may change the points of both of two shapes.
+ * result is certified. pin and auto may change those of both of two shapes.
  *
  * - rotate: rotations only. With landmarks, generalised Procrustes (Peng & Timalsena 2016, section 7.1) gives them.
  *   Without, a search over SO(3) finds the rotation under which the map between the shapes is nearest to a rigid
@@ -31,8 +31,8 @@ ORB_API void orb_align_defaults(orb_align_options *options);
  * - auto: pin if there are landmarks. Without landmarks, auto first searches for rotations, then matches each later
  *   shape with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both
  *   shapes least. The composed map sends each vertex to where the match takes it. The preset fast only searches for
- *   rotations. `found` shows what was matched. Of two shapes, the less round one, which has less volume at the same
- *   area, counts as the first, so both orders have the same map. Its points stay with fast.
+ *   rotations. `found` shows what was matched. Of two shapes without landmarks, the less round one, which has less
+ *   volume at the same area, counts as the first, so both orders have the same map; two with holes are taken as given.
  *
  * Landmarks at the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * landmarks that are out of range or share a place on some shapes only. If the landmarks cannot all be met, it names

@@ -98,7 +98,7 @@ typedef struct orb_rim_match {
   int32_t hole[2];
   int32_t edges[2];          /* of the rims, in the files */
   double length_relative[2]; /* of the rims, to the diagonals */
-  double off_relative; /* the most that a vertex of one rim is away from the other rim, on one of the two shapes, to its
+  double off_relative; /* the most that a vertex of the first rim is away from the second one on the later shape, to its
                           diagonal; 0 up to rounding where all points of the rims meet */
 } orb_rim_match;
 
@@ -106,7 +106,7 @@ typedef struct orb_alignment {
   int32_t shape_count, landmark_count;
   orb_aligned_shape *shapes;
   /* auto without landmarks: at most ORB_FOUND_MAX found landmarks, which show the correspondence; they are far from
-   * each other on the first shape. A client can correct them and send them as landmarks. They are not vertices. */
+   * each other on one shape. A client can correct them and send them as landmarks. They are not vertices. */
   int32_t found_count;
   orb_place *found;     /* found_count × shape_count places, on the given meshes */
   double *found_points; /* found_count × 3: their common points on the aligned sphere */
