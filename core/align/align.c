@@ -184,12 +184,11 @@ static void swap_places(orb_place *at, int32_t pairs) {
   }
 }
 
-/* Swaps the two shapes of an alignment without landmarks and rims, and all that is listed by shape. */
+/* Swaps the two shapes of an alignment without landmarks and rims, and the places of its alternatives. */
 static void swap_shapes(orb_alignment *a) {
   const orb_aligned_shape first = a->shapes[0];
   a->shapes[0] = a->shapes[1];
   a->shapes[1] = first;
-  swap_places(a->found, a->found_count);
   for (int32_t i = 0; i < a->alternative_count; i++) {
     swap_places(a->alternatives[i].at, a->alternatives[i].count);
   }
@@ -267,20 +266,21 @@ static orb_status match_rims(orb_context *ctx, const orb_align_shape *shapes, co
              : ORB_OK;
 }
 
-/* Aligns shapes in the order in which the search takes them. */
+/* Aligns shapes in the order in which the search takes them. *energy: of the map that was found, see describe(). */
 static orb_status align_ordered(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                 const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                                orb_alignment *out) {
-  double energy = INFINITY;
+                                orb_alignment *out, double *energy) {
+  double of_copies = INFINITY;
   int lifted = 0;
   if (is_large(shapes, shape_count, options)) {
-    ORB_TRY(align_copies(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &energy, &lifted));
+    ORB_TRY(align_copies(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &of_copies, &lifted));
   }
   if (!lifted) {
     ORB_TRY(align_shapes(ctx, shapes, shape_count, landmarks, landmark_count, options, out));
   }
   ORB_TRY(match_rims(ctx, shapes, options, out));
-  return describe(ctx, shapes, landmarks, landmark_count, options, lifted ? energy : out->energy, out);
+  *energy = lifted ? of_copies : out->energy;
+  return ORB_OK;
 }
 
 /* The volume of a shape, relative to that of a ball of its area but for a constant factor. */
@@ -302,10 +302,10 @@ static int first_of_pair(const orb_align_shape shapes[2]) {
 
 /* Aligns two shapes without landmarks. */
 static orb_status align_pair(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
-                             orb_alignment *out) {
+                             orb_alignment *out, double *energy) {
   const int first = first_of_pair(shapes);
   const orb_align_shape ordered[2] = {shapes[first], shapes[1 - first]};
-  const orb_status status = align_ordered(ctx, ordered, 2, NULL, 0, options, out);
+  const orb_status status = align_ordered(ctx, ordered, 2, NULL, 0, options, out, energy);
   if (first == 1 && status == ORB_OK) {
     swap_shapes(out);
   }
@@ -324,8 +324,13 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
   const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
   const int is_pair = options->method == ORB_ALIGN_AUTO && shape_count == 2 && landmark_count == 0;
-  const orb_status status = is_pair ? align_pair(ctx, shapes, options, out)
-                                    : align_ordered(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+  double energy = INFINITY;
+  orb_status status = is_pair
+                          ? align_pair(ctx, shapes, options, out, &energy)
+                          : align_ordered(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &energy);
+  if (status == ORB_OK) {
+    status = describe(ctx, shapes, landmarks, landmark_count, options, energy, out);
+  }
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
   } else {

@@ -245,11 +245,7 @@ static void assert_same_swapped(const orb_mesh mesh[2], const orb_alignment *a, 
     assert_memory_equal(a->shapes[s].points, swapped->shapes[1 - s].points,
                         3 * (size_t)mesh[s].vertex_count * sizeof(double));
   }
-  assert_true(a->found_count > 0 && a->alternative_count > 0);
-  assert_int_equal(a->found_count, swapped->found_count);
-  assert_same_places(a->found, swapped->found, a->found_count);
-  assert_memory_equal(a->found_points, swapped->found_points, 3 * (size_t)a->found_count * sizeof(double));
-  assert_memory_equal(a->confidence, swapped->confidence, (size_t)a->found_count * sizeof(double));
+  assert_true(a->alternative_count > 0);
   assert_int_equal(a->alternative_count, swapped->alternative_count);
   for (int32_t i = 0; i < a->alternative_count; i++) {
     const orb_alternative *one = &a->alternatives[i], *other = &swapped->alternatives[i];
@@ -259,8 +255,7 @@ static void assert_same_swapped(const orb_mesh mesh[2], const orb_alignment *a, 
   }
 }
 
-/* Whoever swaps two shapes gets the same map, the same found landmarks and the same alternatives, also where a copy of
- * one stands for it. */
+/* Whoever swaps two shapes gets the same map and the same alternatives, also where a copy of one stands for it. */
 static void order_changes_nothing(void **unused) {
   static const int levels[][2] = {{4, 4}, {4, 6}}; /* the round one is large and copied */
   (void)unused;

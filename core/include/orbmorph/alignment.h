@@ -106,7 +106,7 @@ typedef struct orb_alignment {
   int32_t shape_count, landmark_count;
   orb_aligned_shape *shapes;
   /* auto without landmarks: at most ORB_FOUND_MAX found landmarks, which show the correspondence; they are far from
-   * each other on one shape. A client can correct them and send them as landmarks. They are not vertices. */
+   * each other on the first shape. A client can correct them and send them as landmarks. They are not vertices. */
   int32_t found_count;
   orb_place *found;     /* found_count × shape_count places, on the given meshes */
   double *found_points; /* found_count × 3: their common points on the aligned sphere */
