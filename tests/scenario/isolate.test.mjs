@@ -125,10 +125,10 @@ test('a process that dies while it checks a file leaves a record, and after thre
     }
   }
   assertProblem(await killed('SIGSEGV'), 500, 'job-crashed');
-  const listed = () => until(async () => (await command('crash', 'list')).trim(), 'a record', 10);
+  const listed = () => until(async () => (await command('crash', 'list')).trim(), 'a record', 30);
   assert.match(await listed(), /^([0-9a-f]{64}) crashes=1 mesh=\1 tenant=evil last=/);
   for (const signal of ['SIGBUS', 'SIGABRT']) assertProblem(await killed(signal), 500, 'job-crashed');
-  await until(async () => / crashes=3 refused /.test(await listed()), 'three are counted', 10);
+  await until(async () => / crashes=3 refused /.test(await listed()), 'three are counted', 30);
   const refused = await d.post('/v1/meshes', file, evil);
   assertProblem(refused, 500, 'job-crashed');
   assert.match(refused.json.detail, /until the operator clears/);
@@ -137,7 +137,7 @@ test('a process that dies while it checks a file leaves a record, and after thre
 
   // The kernel's signal where memory is short counts as well: a file may need it each time.
   for (let death = 1; death <= 3; death++) assertProblem(await killed('SIGKILL'), 500, 'job-crashed');
-  await until(async () => / crashes=3 refused /.test(await listed()), 'three are counted', 10);
+  await until(async () => / crashes=3 refused /.test(await listed()), 'three are counted', 30);
   assertProblem(await d.post('/v1/meshes', file, evil), 500, 'job-crashed');
   await command('crash', 'clear', 'evil');
   assert.equal((await d.post('/v1/meshes', file, evil)).status, 201);
@@ -268,7 +268,7 @@ test('a process that dies while it makes a profile leaves a record, and one that
   }
   const id = url.split('/').pop();
   const refused = new RegExp(`^[0-9a-f]{64} crashes=3 refused mesh=${id} tenant= last=`);
-  await until(async () => refused.test(await admin('list')), 'three are counted', 10);
+  await until(async () => refused.test(await admin('list')), 'three are counted', 30);
   const again = await d.get(`${url}/asset.glb?profile=meshopt`);
   assertProblem(again, 500, 'job-crashed');
   assert.match(again.json.detail, /Three processes/);
