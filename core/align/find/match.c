@@ -150,16 +150,11 @@ end:
   return status;
 }
 
-/* How round a copy is: its volume, relative to a ball of its area. */
+/* How round a copy is: its volume, relative to a ball of the area that copies are scaled to. */
 static double roundness(const orb_mesh *copy) {
-  double volume = 0;
-  for (int32_t t = 0; t < copy->triangle_count; t++) {
-    const int32_t *v = copy->triangles + 3 * (size_t)t;
-    double n[3];
-    orb_cross(copy->positions + 3 * (size_t)v[0], copy->positions + 3 * (size_t)v[1], n);
-    volume += orb_dot(n, copy->positions + 3 * (size_t)v[2]) / 6;
-  }
-  return fabs(volume) / (4 * M_PI / 3);
+  orb_extent extent;
+  orb_mesh_extent(copy, &extent);
+  return fabs(extent.volume) / (4 * M_PI / 3);
 }
 
 /* Places the landmarks on the copies. *stretch: see orb_hint_stretch(); 0 if they do not tell. */
