@@ -5,6 +5,7 @@ import path from 'node:path';
 import test from 'node:test';
 import { daemon, samples, slow } from './support/daemon.mjs';
 import { morphOf, topologyOf, vertexAt } from './support/glb.mjs';
+import { apart, diagonalOf, placed } from './support/misplaced.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const landmarksOf = async (file) => JSON.parse(await readFile(path.join(samples, file), 'utf8')).landmarks;
@@ -127,20 +128,12 @@ const LIMBS = {
   'right hind limb': (x, y, z) => x < 0 && y < 0.4 && z > 0,
 };
 
-const position = ({ triangles, positions }, { triangle, barycentric }) =>
-  [0, 1, 2].map((k) => triangles[triangle].reduce((sum, v, i) => sum + positions[v][k] * barycentric[i], 0));
-
-const extent = ({ positions }) =>
-  Math.hypot(
-    ...[0, 1, 2].map((k) => Math.max(...positions.map((p) => p[k])) - Math.min(...positions.map((p) => p[k]))),
-  );
-
 // How far a place may slide along shape s, relative to its diagonal: as far as a part reaches that a warning names as stretched, or 1 %.
 function slides({ warnings = [] }, s, at, diagonal) {
   const spots = warnings
     .filter(({ kind }) => kind === 'stretched')
     .flatMap(({ parts }) => parts.map((part) => part.at.find(({ shape }) => shape === s)));
-  const around = spots.filter(({ centre, radius }) => Math.hypot(...centre.map((c, k) => c - at[k])) <= radius);
+  const around = spots.filter(({ centre, radius }) => apart(centre, at) <= radius);
   return Math.max(0.01, ...around.map(({ radius }) => radius / diagonal));
 }
 
@@ -158,7 +151,7 @@ test('correspondence without landmarks', async (t) => {
     if (!LIMBS[l.name]) assert.equal(l.name, `auto ${i + 1}`);
     else {
       // the dog looks along x and stands along y, so its left is −z
-      const [x, y, z] = position(sources[0], l.at[0]);
+      const [x, y, z] = placed(sources[0], l.at[0]);
       assert.ok(LIMBS[l.name](x, y, z), `${l.name} at ${x}, ${y}, ${z}`);
       words.add(l.name);
     }
@@ -168,7 +161,7 @@ test('correspondence without landmarks', async (t) => {
       assert.ok(place.triangle < sources[s].triangles.reduce((sum, face) => sum + face.length - 2, 0));
       assert.ok(Math.abs(place.barycentric.reduce((a, b) => a + b) - 1) < 1e-9);
       // Within the tolerance of the surface, but the omitted parts let the place slide along it.
-      const most = slides(absent.resource, s, position(sources[s], place), extent(sources[s]));
+      const most = slides(absent.resource, s, placed(sources[s], place), diagonalOf(sources[s]));
       assert.ok(l.residual_relative[s] < most, `${l.name}: ${l.residual_relative}`);
     }
   });
