@@ -18,6 +18,7 @@
 #include "isolate/isolate.h"
 #include "isolate/sandbox.h"
 #include "log.h"
+#include "orbmorph/context.h"
 
 enum { PASSED_MOST = 3, HELLO_MS = 60000, PROCESSES = 1024, STATUS_MS = 2000 };
 /* A process closes its channel when it exits, and has its status well within a millisecond of that. One that still runs
@@ -263,12 +264,15 @@ static pid_t spawn(int fd) {
   while (environ[count]) {
     count++;
   }
-  char **variables = calloc(count + 2, sizeof *variables);
+  char **variables = calloc(count + 3, sizeof *variables);
   if (!variables) {
     return -1;
   }
   memcpy(variables, environ, count * sizeof *variables);
-  variables[count] = (char *)(uintptr_t) "LD_BIND_NOW=1";
+  variables[count++] = (char *)(uintptr_t) "LD_BIND_NOW=1";
+  if (!getenv(ORB_HEAP_VARIABLE)) { /* an administrator's own settings stay */
+    variables[count++] = (char *)(uintptr_t)(ORB_HEAP_VARIABLE "=" ORB_HEAP_TUNABLES);
+  }
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);

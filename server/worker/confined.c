@@ -206,6 +206,7 @@ void confined_work(int channel) {
   if (c.task.kind == TASK_PROFILE) {
     run_conversion(&c, &f);
   }
+  orb_keep_heap();
   c.request = strdup((const char *)f.bytes + sizeof c.task);
   frame_free(&f);
   while (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) == CHANNEL_OK && f.type == FRAME_INPUT) {
