@@ -97,17 +97,23 @@ static int link_is_clean(const unfolding *u, const int32_t *star, int count, int
   return n > 0 && common == 2 && n + count - 4 < RING_MOST;
 }
 
-/* Flipped triangles of the fan that neighbour k makes of the ring. *least: the least fatness of a triangle of it. */
-static int fan_flips(const unfolding *u, const int32_t *star, int count, int k, double *least) {
+/* Flipped triangles of the fan that neighbour k makes of the ring; more than `most` where there are more. */
+static int fan_flips(const unfolding *u, const int32_t *ring, int count, int k, int most) {
   int flips = 0;
-  int32_t c = end_of(u, star[k]);
-  *least = INFINITY;
-  for (int i = 1; i + 1 < count; i++) {
-    int32_t a = end_of(u, star[(k + i) % count]), b = end_of(u, star[(k + i + 1) % count]);
-    *least = fmin(*least, orb_fatness(at(u, c), at(u, a), at(u, b)));
-    flips += is_flipped(u, c, a, b);
+  for (int i = 1; i + 1 < count && flips <= most; i++) {
+    flips += is_flipped(u, ring[k], ring[(k + i) % count], ring[(k + i + 1) % count]);
   }
   return flips;
+}
+
+/* The least fatness of a triangle of that fan. */
+static double fan_fatness(const unfolding *u, const int32_t *ring, int count, int k) {
+  double least = INFINITY;
+  for (int i = 1; i + 1 < count; i++) {
+    double fat = orb_fatness(at(u, ring[k]), at(u, ring[(k + i) % count]), at(u, ring[(k + i + 1) % count]));
+    least = fat < least ? fat : least;
+  }
+  return least;
 }
 
 static int star_flips(const unfolding *u, const int32_t *star, int count) {
@@ -180,34 +186,48 @@ static void split(unfolding *u, const collapse *c) {
   u->corner[ring[c->count - 1]] = orb_next(last);
 }
 
+/* The neighbour that v is collapsed onto: one that leaves the fewest flips, *flips, at most `most`, and of these the
+ * fattest fan; -1: none. Few neighbours leave so few flips, so their number is looked at first. */
+static int best_neighbour(const unfolding *u, const int32_t *star, int count, int most, int *flips) {
+  int32_t ring[RING_MOST];
+  int best = -1;
+  double fattest = -INFINITY;
+  for (int k = 0; k < count; k++) {
+    ring[k] = end_of(u, star[k]);
+  }
+  *flips = most;
+  for (int k = 0; k < count; k++) {
+    const int found = fan_flips(u, ring, count, k, *flips);
+    if (found > *flips) {
+      continue;
+    }
+    const double fat = fan_fatness(u, ring, count, k);
+    if ((best < 0 || found < *flips || fat > fattest) && link_is_clean(u, star, count, k)) {
+      best = k;
+      *flips = found;
+      fattest = fat;
+    }
+  }
+  return best;
+}
+
 /* Collapses v if `allowed`. Returns whether it did. */
 static int try_vertex(unfolding *u, int32_t v, enum allowed allowed) {
   int32_t star[RING_MOST];
   if (u->l->pinned[v] || u->corner[v] < 0) {
     return 0;
   }
-  int count = star_of(u, v, star), best = -1, least_flips = 0;
+  int count = star_of(u, v, star), left;
   int before = star_flips(u, star, count);
-  double fattest = -INFINITY;
   if (count < 3 || (before == 0 && allowed != THIN) || u->ring_count + count > u->ring_capacity) {
     return 0;
   }
-  for (int k = 0; k < count; k++) {
-    double fat;
-    int flips = fan_flips(u, star, count, k, &fat);
-    if ((flips < before || (allowed != FEWER && flips == before)) &&
-        (best < 0 || flips < least_flips || (flips == least_flips && fat > fattest)) &&
-        link_is_clean(u, star, count, k)) {
-      best = k;
-      least_flips = flips;
-      fattest = fat;
-    }
-  }
+  int best = best_neighbour(u, star, count, allowed == FEWER ? before - 1 : before, &left);
   if (best < 0) {
     return 0;
   }
   apply(u, v, star, count, best);
-  u->flips += least_flips - before;
+  u->flips += left - before;
   return 1;
 }
 
