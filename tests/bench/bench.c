@@ -1,5 +1,6 @@
 /* The command line. */
 #include <errno.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -287,8 +288,11 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
 
 /* As the processes of the daemon's jobs. The C library reads the variable only when a program starts. */
 static void take_heap(char **argv) {
-  if (!getenv(ORB_HEAP_VARIABLE) && setenv(ORB_HEAP_VARIABLE, ORB_HEAP_TUNABLES, 1) == 0) {
-    (void)execv("/proc/self/exe", argv); /* without it, everything is only slower */
+  char self[PATH_MAX];
+  ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+  if (!getenv(ORB_HEAP_VARIABLE) && length > 0 && setenv(ORB_HEAP_VARIABLE, ORB_HEAP_TUNABLES, 1) == 0) {
+    self[length] = '\0';
+    (void)execv(self, argv); /* without it, everything is only slower */
   }
   orb_keep_heap();
 }
