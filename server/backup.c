@@ -21,10 +21,16 @@
 typedef struct haul {
   objects *from, *to;
   const char *place; /* what `to` is */
+  int64_t reserve;   /* bytes that stay free there: disk-reserve */
   snapshot *rows;
   long objects, made, wrong, deleted;
   const char *stopped; /* why nothing more can be written; NULL: it can */
 } haul;
+
+static const char no_space[] =
+    "has no space left beside the disk-reserve: free some, name a folder on another disk, or lower --disk-reserve; "
+    "then "
+    "run this again";
 
 static int complain(const char *folder, const char *why) {
   fprintf(stderr, "orbmorphd: %s %s\n", folder, why);
@@ -96,10 +102,10 @@ static void bring_row(void *user, const resource *row) {
   int count = resource_objects(row, named);
   for (int i = 0; i < count && !h->stopped; i++) {
     transfer_deed deed;
-    store_result result = transfer_object(h->from, h->to, row->id, &named[i], &deed);
+    store_result result = transfer_object(h->from, h->to, row->id, &named[i], h->reserve, &deed);
     h->objects++;
     h->made += deed != TRANSFER_NONE;
-    h->stopped = result == STORE_FULL ? "has no space left" : result == STORE_ERROR ? "cannot be written" : NULL;
+    h->stopped = result == STORE_FULL ? no_space : result == STORE_ERROR ? "cannot be written" : NULL;
     if (deed == TRANSFER_MENDED) {
       printf("%s %s: %s in the %s was damaged and is copied again\n", names[row->kind], row->id, named[i].what,
              h->place);
@@ -148,12 +154,23 @@ static int hold_deletions(const char *data) {
   return fd;
 }
 
-static int take(const char *folder, const char *data) {
-  char path[PATH_MAX];
-  haul h = {.place = "backup"};
-  snprintf(path, sizeof path, "%s/%s", folder, place_new_catalogue);
-  int fine = snapshot_take(data, path) == STORE_OK && objects_open_read_only(data, &h.from) == STORE_OK &&
-             objects_open(folder, &h.to) == STORE_OK && bring_objects(&h, folder) && commit(folder) &&
+/* Copies the catalogue of `data` to folder/catalogue.new, if it leaves the reserve free. */
+static int take_catalogue(const haul *h, const char *folder, const char *data) {
+  char from[PATH_MAX], to[PATH_MAX];
+  struct stat info;
+  snprintf(from, sizeof from, "%s/catalogue.sqlite", data);
+  snprintf(to, sizeof to, "%s/%s", folder, place_new_catalogue);
+  if (stat(from, &info) == 0 && (uint64_t)h->reserve + (uint64_t)info.st_size > objects_free_bytes(h->to)) {
+    return complain(folder, no_space);
+  }
+  return snapshot_take(data, to) == STORE_OK;
+}
+
+static int take(const char *folder, const config *options) {
+  const char *data = options->data;
+  haul h = {.place = "backup", .reserve = options->disk_reserve};
+  int fine = objects_open(folder, &h.to) == STORE_OK && take_catalogue(&h, folder, data) &&
+             objects_open_read_only(data, &h.from) == STORE_OK && bring_objects(&h, folder) && commit(folder) &&
              objects_each(h.to, sweep_one, &h) == STORE_OK;
   if (fine) {
     printf("%ld objects in the backup: %ld new, %ld deleted that the last backup had, %ld damaged or missing\n",
@@ -214,7 +231,7 @@ static int run_backup(const char *folder, const config *options) {
   int held = lock >= 0 && put_file(folder, place_backup_mark, "orbmorph backup, format 1\n")
                  ? hold_deletions(options->data)
                  : -1;
-  int status = held >= 0 ? take(folder, options->data) : 1;
+  int status = held >= 0 ? take(folder, options) : 1;
   if (held >= 0) {
     close(held);
   }
@@ -256,12 +273,13 @@ static int begin_filling(const char *data) {
 }
 
 /* What a restore that was killed has brought stays, unless this backup does not name it. */
-static int put_back(const char *folder, const char *data) {
+static int put_back(const char *folder, const config *options) {
+  const char *data = options->data;
   char path[PATH_MAX];
-  haul h = {.place = "new folder"};
+  haul h = {.place = "new folder", .reserve = options->disk_reserve};
   snprintf(path, sizeof path, "%s/%s", data, place_new_catalogue);
-  int fine = snapshot_take(folder, path) == STORE_OK && snapshot_requeue(path) == STORE_OK &&
-             objects_open_read_only(folder, &h.from) == STORE_OK && objects_open(data, &h.to) == STORE_OK &&
+  int fine = objects_open(data, &h.to) == STORE_OK && take_catalogue(&h, data, folder) &&
+             snapshot_requeue(path) == STORE_OK && objects_open_read_only(folder, &h.from) == STORE_OK &&
              bring_objects(&h, data) && objects_each(h.to, sweep_one, &h) == STORE_OK && commit(data);
   if (fine) {
     printf("%ld objects restored, %ld damaged or missing\n", h.objects - h.wrong, h.wrong);
@@ -288,7 +306,7 @@ static int run_restore(const char *folder, const config *options) {
     return 1;
   }
   int lock = hold_backup(folder) ? begin_filling(options->data) : -1;
-  int status = lock >= 0 ? put_back(folder, options->data) : 1;
+  int status = lock >= 0 ? put_back(folder, options) : 1;
   if (lock >= 0) {
     close(lock);
   }

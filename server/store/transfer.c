@@ -20,6 +20,7 @@ typedef struct transfer {
   struct stat info; /* of the source */
   const char *id;
   const named_object *object;
+  int64_t reserve; /* bytes that stay free where the copy goes */
 } transfer;
 
 /* Reads a file of the source's size once: hashes it, and appends it to `copy` unless that is NULL. */
@@ -90,6 +91,9 @@ static store_result copy_to(const transfer *t, objects *to) {
   object_temp copy;
   char sha[API_ID_SIZE];
   const struct timespec times[2] = {t->info.st_atim, t->info.st_mtim};
+  if ((uint64_t)t->reserve + (uint64_t)t->info.st_size > objects_free_bytes(to)) {
+    return STORE_FULL;
+  }
   store_result result = objects_begin(to, &copy);
   if (result == STORE_OK) {
     result = read_file(t, t->source, &copy, sha);
@@ -106,8 +110,8 @@ static store_result copy_to(const transfer *t, objects *to) {
 }
 
 store_result transfer_object(const objects *from, objects *to, const char *id, const named_object *object,
-                             transfer_deed *deed) {
-  transfer t = {.id = id, .object = object};
+                             int64_t reserve, transfer_deed *deed) {
+  transfer t = {.id = id, .object = object, .reserve = reserve};
   uint64_t size;
   *deed = TRANSFER_NONE;
   store_result result = objects_read(from, object->kind, id, &t.source, &size);

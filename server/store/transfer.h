@@ -14,8 +14,9 @@ typedef enum transfer_deed {
  * the hash first: those of the source before they are published, so a damaged object never replaces another, and else
  * those of the copy that stays. A hard link to the source is no copy. A copy is on the disk when this returns; the
  * caller syncs the folders.
- * STORE_NOT_FOUND: `from` lacks it. STORE_CONFLICT: it does not match its hash. */
+ * STORE_NOT_FOUND: `from` lacks it. STORE_CONFLICT: it does not match its hash. STORE_FULL: the disk of `to` would have
+ * less than `reserve` bytes free. */
 store_result transfer_object(const objects *from, objects *to, const char *id, const named_object *object,
-                             transfer_deed *deed);
+                             int64_t reserve, transfer_deed *deed);
 
 #endif

@@ -2,11 +2,12 @@
 // small file system in memory; it is skipped if mounting is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
-import { closeSync, mkdtempSync, openSync, rmSync, unlinkSync, writeSync } from 'node:fs';
+import { closeSync, mkdtempSync, openSync, rmSync, statfsSync, unlinkSync, writeSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
-import { Daemon, assertProblem } from './support/daemon.mjs';
+import { runProgram } from './support/cli.mjs';
+import { assertProblem, binaries, Daemon, daemon } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** Fills the file system to the last block; less than one block is left. */
@@ -106,4 +107,32 @@ test('a body of unknown length leaves the reserve free, too', async (t) => {
   assertProblem(await send(96), 507, 'storage-full'); // 24 MB, for which the disk has room
   assertProblem(await send(16), 400, 'malformed-mesh'); // 4 MB are read to the end
   assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
+});
+
+test('a backup leaves the reserve free, and goes on where it has room', async (t) => {
+  const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
+  const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=16m', 'tmpfs', mount]);
+  if (mounted.status !== 0) {
+    rmSync(mount, { recursive: true });
+    return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
+  }
+  t.after(() => {
+    execFileSync('umount', ['-l', mount]);
+    rmSync(mount, { recursive: true });
+  });
+  const d = await daemon(t);
+  for (let n = 0; n < 12; n++) {
+    const text = shapes.obj(shapes.ball(2, ([x, y, z]) => [x * (1 + n / 100), y, z])) + '# padding\n'.repeat(1e5); // 1 MB
+    assert.equal((await d.upload(text)).status, 201);
+  }
+  const run = (...args) =>
+    runProgram(binaries.daemon, ['backup', path.join(mount, 'backup'), '--data', d.data, ...args]);
+  const free = () => statfsSync(mount).bavail * statfsSync(mount).bsize;
+  const full = await run('--disk-reserve', '8M');
+  assert.equal(full.code, 1);
+  assert.match(full.err, /has no space left beside the disk-reserve/);
+  assert.ok(free() >= 8 << 20 && free() < 12 << 20, `${free()} bytes are free`); // some objects are there
+  const whole = await run('--disk-reserve', '1M');
+  assert.equal(whole.code, 0, whole.out + whole.err);
+  assert.match(whole.out, /12 objects in the backup/);
 });
