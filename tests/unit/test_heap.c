@@ -10,6 +10,14 @@
 
 #include "orbmorph/orbmorph.h"
 
+#if !defined(__GLIBC__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define OTHER_MALLOC 1
+#elif defined(__has_feature)
+#define OTHER_MALLOC (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
+#else
+#define OTHER_MALLOC 0
+#endif
+
 enum { BLOCKS = 8, BLOCK = 1500000, PAGE = 4096 }; /* bytes; as the arrays of a level of 10,000 triangles */
 
 static long faults(void) {
@@ -34,9 +42,9 @@ static void stage(orb_context *ctx) {
 static void freed_pages_serve_again(void **state) {
   orb_context *ctx;
   (void)state;
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
-  skip(); /* another malloc() */
-#endif
+  if (OTHER_MALLOC) {
+    skip();
+  }
   orb_keep_heap();
   assert_int_equal(orb_context_create(&(orb_context_options){.threads = 1}, &ctx), ORB_OK);
   stage(ctx);
