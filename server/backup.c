@@ -21,16 +21,16 @@
 typedef struct haul {
   objects *from, *to;
   const char *place; /* what `to` is */
-  int64_t reserve;   /* bytes that stay free there: disk-reserve */
+  int64_t reserve;   /* bytes that stay free there */
   snapshot *rows;
   long objects, made, wrong, deleted;
   const char *stopped; /* why nothing more can be written; NULL: it can */
 } haul;
 
 static const char no_space[] =
-    "has no space left beside the disk-reserve: free some, name a folder on another disk, or lower --disk-reserve; "
-    "then "
-    "run this again";
+    "would have less space left than disk-reserve asks for, or twice as much on the disk of the data folder: free "
+    "some, "
+    "or lower --disk-reserve, and run this again; to use another disk, delete this folder";
 
 static int complain(const char *folder, const char *why) {
   fprintf(stderr, "orbmorphd: %s %s\n", folder, why);
@@ -154,21 +154,38 @@ static int hold_deletions(const char *data) {
   return fd;
 }
 
-/* Copies the catalogue of `data` to folder/catalogue.new, if it leaves the reserve free. */
-static int take_catalogue(const haul *h, const char *folder, const char *data) {
-  char from[PATH_MAX], to[PATH_MAX];
+/* The space that a file takes; 0: there is none. */
+static uint64_t space_of(const char *folder, const char *name) {
+  char path[PATH_MAX];
   struct stat info;
-  snprintf(from, sizeof from, "%s/catalogue.sqlite", data);
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  return stat(path, &info) == 0 ? (uint64_t)info.st_blocks * 512 : 0;
+}
+
+/* Bytes that stay free where objects go. Uploads need the reserve and their own bytes: so a backup that shares their
+ * disk leaves twice the reserve. */
+static int64_t reserve_of(const char *folder, const config *options) {
+  struct stat a, b;
+  const int shared = stat(folder, &a) == 0 && stat(options->data, &b) == 0 && a.st_dev == b.st_dev;
+  return options->disk_reserve * (shared ? 2 : 1);
+}
+
+/* Copies the catalogue of `data` to folder/catalogue.new, if it leaves the reserve free. What an earlier run has left
+ * there is replaced. */
+static int take_catalogue(const haul *h, const char *folder, const char *data) {
+  char to[PATH_MAX];
+  const uint64_t space = space_of(data, "catalogue.sqlite") + space_of(data, "catalogue.sqlite-wal");
   snprintf(to, sizeof to, "%s/%s", folder, place_new_catalogue);
-  if (stat(from, &info) == 0 && (uint64_t)h->reserve + (uint64_t)info.st_size > objects_free_bytes(h->to)) {
+  if ((uint64_t)h->reserve + space > objects_free_bytes(h->to) + space_of(folder, place_new_catalogue)) {
     return complain(folder, no_space);
   }
-  return snapshot_take(data, to) == STORE_OK;
+  store_result result = snapshot_take(data, to);
+  return result == STORE_FULL ? complain(folder, no_space) : result == STORE_OK;
 }
 
 static int take(const char *folder, const config *options) {
   const char *data = options->data;
-  haul h = {.place = "backup", .reserve = options->disk_reserve};
+  haul h = {.place = "backup", .reserve = reserve_of(folder, options)};
   int fine = objects_open(folder, &h.to) == STORE_OK && take_catalogue(&h, folder, data) &&
              objects_open_read_only(data, &h.from) == STORE_OK && bring_objects(&h, folder) && commit(folder) &&
              objects_each(h.to, sweep_one, &h) == STORE_OK;

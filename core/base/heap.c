@@ -9,9 +9,11 @@
 #if defined(__GLIBC__)
 /* TOP_PAD: bytes by which the heap grows at once. Huge pages fill only what grows at once: with 2 MiB a job had three
  * times the page faults, beyond 16 MiB nothing changed. KEPT: bytes free at the end of the heap before it shrinks; more
- * than one stage of an alignment of two shapes of 100,000 triangles frees. MAPPED: from this size on malloc() maps
- * blocks one by one; twice what blocks of a context have at most. */
-enum { TOP_PAD = 16 << 20, KEPT = 64 << 20, MAPPED = 4 << 20 };
+ * than one stage of an alignment of two shapes of 100,000 triangles frees. A context counts what is kept against its
+ * memory_limit. MAPPED: from this size on malloc() maps blocks one by one: more than blocks of a context have, and less
+ * than what libraries take rarely. ARENAS: one, since only the main heap gives back what is asked of it; threads take
+ * blocks too seldom to wait for each other. */
+enum { TOP_PAD = 16 << 20, KEPT = 64 << 20, MAPPED = 4 << 20, ARENAS = 1 };
 #endif
 
 void orb_keep_heap(void) {
@@ -19,5 +21,6 @@ void orb_keep_heap(void) {
   (void)mallopt(M_TOP_PAD, TOP_PAD);
   (void)mallopt(M_TRIM_THRESHOLD, KEPT);
   (void)mallopt(M_MMAP_THRESHOLD, MAPPED);
+  (void)mallopt(M_ARENA_MAX, ARENAS);
 #endif
 }

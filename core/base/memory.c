@@ -10,6 +10,9 @@
 #if defined(__linux__)
 #include <sys/mman.h>
 #endif
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 
 #include "base/check.h"
 #include "base/error.h"
@@ -60,16 +63,50 @@ static void *out_of_memory(orb_context *ctx, size_t wanted, int budget) {
   return NULL;
 }
 
-static int charge(orb_context *ctx, size_t total) {
-  size_t used = atomic_fetch_add(&ctx->root->memory_used, total) + total;
-  if (ctx->options.memory_limit && used > ctx->options.memory_limit) {
-    atomic_fetch_sub(&ctx->root->memory_used, total);
+static void raise_to(atomic_size_t *most, size_t value) {
+  size_t known = atomic_load(most);
+  while (value > known && !atomic_compare_exchange_weak(most, &known, value)) {
+  }
+}
+
+/* A heap that keeps what is freed (orb_keep_heap()) holds more than what is in use. Both together stay within the
+ * limit: what is kept goes back where the limit has no more room for it. */
+static void give_back(const orb_context *ctx, size_t used) {
+#if defined(__GLIBC__)
+  orb_context *root = ctx->root;
+  const size_t heap = atomic_load(&root->heap_used), held = atomic_load(&root->heap_held);
+  if (held > heap && used + (held - heap) > ctx->options.memory_limit) {
+    (void)malloc_trim(0);
+    atomic_store(&root->heap_held, heap);
+  }
+#else
+  (void)ctx;
+  (void)used;
+#endif
+}
+
+static int charge(orb_context *ctx, size_t total, int mapped) {
+  orb_context *root = ctx->root;
+  const size_t limit = ctx->options.memory_limit, used = atomic_fetch_add(&root->memory_used, total) + total;
+  if (limit && used > limit) {
+    atomic_fetch_sub(&root->memory_used, total);
     return 0;
   }
-  size_t peak = atomic_load(&ctx->root->memory_peak);
-  while (used > peak && !atomic_compare_exchange_weak(&ctx->root->memory_peak, &peak, used)) {
+  raise_to(&root->memory_peak, used);
+  if (!mapped) {
+    raise_to(&root->heap_held, atomic_fetch_add(&root->heap_used, total) + total);
+  }
+  if (limit) {
+    give_back(ctx, used);
   }
   return 1;
+}
+
+static void discharge(orb_context *ctx, size_t total, int mapped) {
+  atomic_fetch_sub(&ctx->root->memory_used, total);
+  if (!mapped) {
+    atomic_fetch_sub(&ctx->root->heap_used, total);
+  }
 }
 
 #ifdef ORB_MAPS
@@ -126,13 +163,13 @@ void *orb_alloc(orb_context *ctx, size_t count, size_t size) {
   if (total == 0) {
     return out_of_memory(ctx, SIZE_MAX, 0);
   }
-  if (!charge(ctx, total)) {
+  int mapped = maps(ctx, total);
+  if (!charge(ctx, total, mapped)) {
     return out_of_memory(ctx, total, 1);
   }
-  int mapped = maps(ctx, total);
   void *raw = get_raw(ctx, total, mapped);
   if (!raw) {
-    atomic_fetch_sub(&ctx->root->memory_used, total);
+    discharge(ctx, total, mapped);
     return out_of_memory(ctx, total, 0);
   }
   uintptr_t start = ((uintptr_t)raw + 2 * ALIGNMENT - 1) & ~(uintptr_t)(ALIGNMENT - 1);
@@ -154,18 +191,18 @@ void *orb_calloc(orb_context *ctx, size_t count, size_t size) {
 static void *remap(orb_context *ctx, void *block, size_t total, size_t bytes) {
   block_header *header = header_of(block);
   size_t old = header->total, offset = (size_t)((char *)block - (char *)header->raw);
-  if (total > old && !charge(ctx, total - old)) {
+  if (total > old && !charge(ctx, total - old, 1)) {
     return out_of_memory(ctx, total - old, 1);
   }
   char *raw = mremap(header->raw, old, total, MREMAP_MAYMOVE);
   if (raw == MAP_FAILED) {
     if (total > old) {
-      atomic_fetch_sub(&ctx->root->memory_used, total - old);
+      discharge(ctx, total - old, 1);
     }
     return out_of_memory(ctx, total, 0);
   }
   if (total < old) {
-    atomic_fetch_sub(&ctx->root->memory_used, old - total);
+    discharge(ctx, old - total, 1);
   }
   block = raw + offset;
   header = header_of(block);
@@ -200,7 +237,7 @@ void orb_free(orb_context *ctx, void *block) {
   ORB_ASSERT(header->magic == BLOCK_MAGIC);
   header->magic = FREED_MAGIC;
   size_t total = header->total;
-  atomic_fetch_sub(&ctx->root->memory_used, total);
+  discharge(ctx, total, header->mapped);
   void *raw = header->raw;
 #ifdef ORB_MAPS
   if (header->mapped) {

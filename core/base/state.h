@@ -13,6 +13,7 @@ struct orb_context {
   orb_context_options options;
   atomic_int cancelled;
   atomic_size_t memory_used, memory_peak; /* bytes */
+  atomic_size_t heap_used, heap_held;     /* of memory_used, what malloc() serves, and the most since it gave back */
   pthread_mutex_t error_lock;             /* guards error while a parallel loop runs */
   orb_error error;
   int in_loop; /* set by orb_parallel_for() around a loop: the first failure wins */

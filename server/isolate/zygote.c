@@ -256,6 +256,19 @@ static struct {
   pid_t pid;
 } own = {.lock = PTHREAD_MUTEX_INITIALIZER, .fd = -1};
 
+enum { TUNABLES_MOST = 1024 }; /* bytes of the variable with its name; an administrator's longer text stays as it is */
+
+/* Writes the variable by which the heap asks for huge pages, after what an administrator has set. 0: that names them
+ * already, or is too long. */
+static int add_tunables(char text[TUNABLES_MOST]) {
+  const char *set = getenv(ORB_HEAP_VARIABLE);
+  if (set && strstr(set, "glibc.malloc.hugetlb")) {
+    return 0;
+  }
+  return snprintf(text, TUNABLES_MOST, "%s=%s%s%s", ORB_HEAP_VARIABLE, set ? set : "", set && set[0] ? ":" : "",
+                  ORB_HEAP_TUNABLES) < TUNABLES_MOST;
+}
+
 static pid_t spawn(int fd) {
   char *arguments[] = {(char *)(uintptr_t) "orbmorphd", (char *)(uintptr_t)ISOLATE_FLAG, NULL};
   posix_spawn_file_actions_t actions;
@@ -264,14 +277,18 @@ static pid_t spawn(int fd) {
   while (environ[count]) {
     count++;
   }
-  char **variables = calloc(count + 3, sizeof *variables);
+  char **variables = calloc(count + 3, sizeof *variables), tunables[TUNABLES_MOST];
   if (!variables) {
     return -1;
   }
   memcpy(variables, environ, count * sizeof *variables);
-  variables[count++] = (char *)(uintptr_t) "LD_BIND_NOW=1";
-  if (!getenv(ORB_HEAP_VARIABLE)) { /* an administrator's own settings stay */
-    variables[count++] = (char *)(uintptr_t)(ORB_HEAP_VARIABLE "=" ORB_HEAP_TUNABLES);
+  variables[count] = (char *)(uintptr_t) "LD_BIND_NOW=1";
+  if (add_tunables(tunables)) {
+    size_t i = 0;
+    while (i <= count && strncmp(variables[i], ORB_HEAP_VARIABLE "=", sizeof ORB_HEAP_VARIABLE) != 0) {
+      i++;
+    }
+    variables[i] = tunables;
   }
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);

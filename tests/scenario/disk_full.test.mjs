@@ -6,7 +6,7 @@ import { closeSync, mkdtempSync, openSync, rmSync, statfsSync, unlinkSync, write
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
-import { runProgram } from './support/cli.mjs';
+import { folder, runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, Daemon, daemon } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
@@ -109,6 +109,17 @@ test('a body of unknown length leaves the reserve free, too', async (t) => {
   assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
 });
 
+/** A mesh whose file has a megabyte. */
+const padded = (n) => shapes.obj(shapes.ball(2, ([x, y, z]) => [x * (1 + n / 100), y, z])) + '# padding\n'.repeat(1e5);
+const backup = (to, data, reserve) =>
+  runProgram(binaries.daemon, ['backup', to, '--data', data, '--disk-reserve', reserve]);
+const restore = (from, data, reserve) =>
+  runProgram(binaries.daemon, ['restore', from, '--data', data, '--disk-reserve', reserve]);
+const stops = ({ code, out, err }) => {
+  assert.equal(code, 1, out);
+  assert.match(err, /would have less space left than disk-reserve asks for/);
+};
+
 test('a backup leaves the reserve free, and goes on where it has room', async (t) => {
   const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
   const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=16m', 'tmpfs', mount]);
@@ -121,18 +132,42 @@ test('a backup leaves the reserve free, and goes on where it has room', async (t
     rmSync(mount, { recursive: true });
   });
   const d = await daemon(t);
-  for (let n = 0; n < 12; n++) {
-    const text = shapes.obj(shapes.ball(2, ([x, y, z]) => [x * (1 + n / 100), y, z])) + '# padding\n'.repeat(1e5); // 1 MB
-    assert.equal((await d.upload(text)).status, 201);
-  }
-  const run = (...args) =>
-    runProgram(binaries.daemon, ['backup', path.join(mount, 'backup'), '--data', d.data, ...args]);
+  const [kept, made] = [path.join(mount, 'backup'), path.join(mount, 'new')];
   const free = () => statfsSync(mount).bavail * statfsSync(mount).bsize;
-  const full = await run('--disk-reserve', '8M');
-  assert.equal(full.code, 1);
-  assert.match(full.err, /has no space left beside the disk-reserve/);
+  for (let n = 0; n < 12; n++) assert.equal((await d.upload(padded(n))).status, 201);
+  stops(await backup(kept, d.data, '64M')); // before the catalogue
+  assert.ok(free() > 15 << 20, `${free()} bytes are free`);
+  stops(await backup(kept, d.data, '8M'));
   assert.ok(free() >= 8 << 20 && free() < 12 << 20, `${free()} bytes are free`); // some objects are there
-  const whole = await run('--disk-reserve', '1M');
-  assert.equal(whole.code, 0, whole.out + whole.err);
-  assert.match(whole.out, /12 objects in the backup/);
+  const whole = await backup(kept, d.data, '1M');
+  assert.match(whole.out, /12 objects in the backup/, whole.err);
+  // One that finds no room leaves the previous one whole.
+  assert.equal((await d.upload(padded(12))).status, 201);
+  stops(await backup(kept, d.data, '14M'));
+  const restored = await restore(kept, path.join(await folder(t), 'data'), '0');
+  assert.match(restored.out, /12 objects restored, 0 damaged or missing/, restored.err);
+  stops(await restore(kept, made, '2M'));
+  assert.ok(free() >= 2 << 20, `${free()} bytes are free`);
+  execFileSync('mount', ['-o', 'remount,size=32m', mount]);
+  const rest = await restore(kept, made, '2M');
+  assert.match(rest.out, /12 objects restored, 0 damaged or missing/, rest.err);
+});
+
+test('a backup on the disk of the service leaves room for uploads', async (t) => {
+  const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
+  const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=24m', 'tmpfs', mount]);
+  if (mounted.status !== 0) {
+    rmSync(mount, { recursive: true });
+    return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
+  }
+  const d = new Daemon(path.join(mount, 'data'), ['--disk-reserve', '4M'], {});
+  t.after(async () => {
+    if (d.child) await d.stop();
+    execFileSync('umount', ['-l', mount]);
+    rmSync(mount, { recursive: true });
+  });
+  await d.start();
+  for (let n = 0; n < 12; n++) assert.equal((await d.upload(padded(n))).status, 201);
+  stops(await backup(path.join(mount, 'backup'), d.data, '4M'));
+  assert.equal((await d.upload(padded(12))).status, 201);
 });

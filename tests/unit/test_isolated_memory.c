@@ -24,9 +24,23 @@ static const int64_t OF_DAEMON = 60; /* MB of it: for the daemon, which this pro
 
 /* ---- the process ---- */
 
+enum { LARGE = (4 << 20) - 128, SMALL = 1 << 12 }; /* bytes of a block; 128: that core adds */
+
+/* Fills the heap with up to `most` bytes, and frees them: the heap keeps what it can. */
+static void fill_heap(orb_context *ctx, size_t most) {
+  enum { BLOCKS = 1 << 16 };
+  static void *blocks[BLOCKS];
+  int count = 0;
+  while (count < BLOCKS && orb_memory_used(ctx) < most && (blocks[count] = orb_alloc(ctx, SMALL, 1)) != NULL) {
+    memset(blocks[count++], 1, SMALL);
+  }
+  while (count > 0) {
+    orb_free(ctx, blocks[--count]);
+  }
+}
+
 /* Takes what its budget allows, in blocks that core maps and in blocks that malloc() serves, and waits. */
 _Noreturn static void fill(int channel) {
-  enum { LARGE = (4 << 20) - 128, SMALL = 1 << 12 }; /* 128: that core adds */
   frame f;
   task_head task;
   orb_context *ctx;
@@ -36,9 +50,11 @@ _Noreturn static void fill(int channel) {
   }
   memcpy(&task, f.bytes, sizeof task);
   task_confine(&task);
+  orb_keep_heap();
   if (orb_context_create(&(orb_context_options){.memory_limit = (size_t)task.memory, .threads = 1}, &ctx) != ORB_OK) {
     _exit(9);
   }
+  fill_heap(ctx, 100 * (size_t)MB);
   for (size_t block = LARGE; block > 0; block = block == LARGE ? SMALL : 0) {
     for (void *at; (at = orb_alloc(ctx, block, 1)) != NULL;) {
       memset(at, 1, block);

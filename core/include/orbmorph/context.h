@@ -112,11 +112,13 @@ ORB_API size_t orb_memory_used(const orb_context *ctx);
 /* The largest use so far, in bytes: a budget for the same work must allow it. */
 ORB_API size_t orb_memory_peak(const orb_context *ctx);
 
-/* For a program that computes and ends, such as one process for each job: malloc() keeps freed memory, which the system
- * would otherwise take back and hand out again page by page, many times in an alignment. Changes settings of the whole
- * process, so the library never calls it; to be called before the first context. Only the C library of GNU has them.
- * With ORB_HEAP_TUNABLES in ORB_HEAP_VARIABLE of the environment that such a program starts with, the heap also has
- * huge pages. Both together: 0.86 of the time of an alignment, and up to 20 MB more memory. */
+/* For a program that computes and ends, such as one process for each job: malloc() keeps up to 64 MiB of freed memory,
+ * which the system would otherwise take back and hand out again page by page, many times in an alignment. Contexts with
+ * a memory_limit count what is kept: it goes back where the limit has no room for it. Changes settings of the whole
+ * process, so the library never calls it; to be called before the program starts threads. Without the C library of GNU
+ * it does nothing.
+ * With ORB_HEAP_TUNABLES in ORB_HEAP_VARIABLE of the environment that such a program starts with, the heap also asks
+ * for huge pages. Only a program that starts reads the variable. docs/library.md says what both bring. */
 ORB_API void orb_keep_heap(void);
 #define ORB_HEAP_VARIABLE "GLIBC_TUNABLES"
 #define ORB_HEAP_TUNABLES "glibc.malloc.hugetlb=1"
