@@ -37,7 +37,7 @@ static int is_all(const unsigned char *bytes, size_t count, unsigned char value)
 static void a_block_keeps_its_bytes_as_it_grows_and_shrinks(void **state) {
   orb_context *ctx;
   (void)state;
-  assert_int_equal(orb_context_create(&(orb_context_options){.threads = 1, .memory_limit = 3 * LARGE}, &ctx), ORB_OK);
+  assert_int_equal(orb_context_create(&(orb_context_options){.threads = 1, .memory_limit = 4 * LARGE}, &ctx), ORB_OK);
   static const size_t sizes[] = {SMALL, LARGE, 2 * LARGE, LARGE, SMALL};
   unsigned char *block = orb_alloc(ctx, SMALL, 1);
   assert_non_null(block);
