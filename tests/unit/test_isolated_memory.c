@@ -24,7 +24,7 @@ static const int64_t OF_DAEMON = 60; /* MB of it: for the daemon, which this pro
 
 /* ---- the process ---- */
 
-enum { LARGE = (4 << 20) - 128, SMALL = 1 << 12 }; /* bytes of a block; 128: that core adds */
+enum { LARGE = (16 << 20) - 128, SMALL = 1 << 12 }; /* bytes of a block; 128: that core adds */
 
 /* Fills the heap with up to `most` bytes, and frees them: the heap keeps what it can. */
 static void fill_heap(orb_context *ctx, size_t most) {
