@@ -2,13 +2,25 @@
 // small file system in memory; it is skipped if mounting is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
-import { closeSync, mkdtempSync, openSync, rmSync, statfsSync, unlinkSync, writeSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { closeSync, openSync, statfsSync, unlinkSync, writeSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
 import { folder, runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, Daemon, daemon } from './support/daemon.mjs';
+import { memoryDisk } from './support/disk.mjs';
 import * as shapes from './support/shapes.mjs';
+
+/** A daemon whose data folder is on a disk in memory; undefined where that cannot be mounted. */
+async function daemonOnDisk(t, size, reserve) {
+  const disk = memoryDisk(t, size);
+  if (!disk) return undefined;
+  const d = new Daemon(path.join(disk.folder, 'data'), ['--disk-reserve', reserve], {});
+  t.after(async () => {
+    if (d.child) await d.stop();
+    disk.unmount();
+  });
+  return { d: await d.start(), mount: disk.folder };
+}
 
 /** Fills the file system to the last block; less than one block is left. */
 function fill(file) {
@@ -27,19 +39,9 @@ for (const [reserve, what] of [
   ['4M', 'foreseen by the reserve'],
 ]) {
   test(`a full disk, ${what}`, async (t) => {
-    const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
-    const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=24m', 'tmpfs', mount]);
-    if (mounted.status !== 0) {
-      rmSync(mount, { recursive: true });
-      return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
-    }
-    const d = new Daemon(path.join(mount, 'data'), ['--disk-reserve', reserve], {});
-    t.after(async () => {
-      if (d.child) await d.stop();
-      execFileSync('umount', ['-l', mount]);
-      rmSync(mount, { recursive: true });
-    });
-    await d.start();
+    const on = await daemonOnDisk(t, '24m', reserve);
+    if (!on) return;
+    const { d, mount } = on;
     const mesh = (n) => shapes.obj(shapes.ball(3, ([x, y, z]) => [x * (1 + n / 100), y, z]));
     const kept = await d.upload(mesh(0), { name: 'kept' });
     assert.equal(kept.status, 201);
@@ -77,19 +79,9 @@ for (const [reserve, what] of [
 }
 
 test('a body of unknown length leaves the reserve free, too', async (t) => {
-  const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
-  const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=32m', 'tmpfs', mount]);
-  if (mounted.status !== 0) {
-    rmSync(mount, { recursive: true });
-    return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
-  }
-  const d = new Daemon(path.join(mount, 'data'), ['--disk-reserve', '16M'], {});
-  t.after(async () => {
-    if (d.child) await d.stop();
-    execFileSync('umount', ['-l', mount]);
-    rmSync(mount, { recursive: true });
-  });
-  await d.start();
+  const on = await daemonOnDisk(t, '32m', '16M');
+  if (!on) return;
+  const { d } = on;
   const chunks = async function* (count) {
     for (let i = 0; i < count; i++) yield Buffer.from('# nothing but words\n'.repeat(13_108)); // of a quarter of a megabyte each
   };
@@ -121,16 +113,10 @@ const stops = ({ code, out, err }) => {
 };
 
 test('a backup leaves the reserve free, and goes on where it has room', async (t) => {
-  const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
-  const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=16m', 'tmpfs', mount]);
-  if (mounted.status !== 0) {
-    rmSync(mount, { recursive: true });
-    return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
-  }
-  t.after(() => {
-    execFileSync('umount', ['-l', mount]);
-    rmSync(mount, { recursive: true });
-  });
+  const disk = memoryDisk(t, '16m');
+  if (!disk) return;
+  t.after(disk.unmount);
+  const mount = disk.folder;
   const d = await daemon(t);
   const [kept, made] = [path.join(mount, 'backup'), path.join(mount, 'new')];
   const free = () => statfsSync(mount).bavail * statfsSync(mount).bsize;
@@ -154,19 +140,9 @@ test('a backup leaves the reserve free, and goes on where it has room', async (t
 });
 
 test('a backup on the disk of the service leaves room for uploads', async (t) => {
-  const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
-  const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=24m', 'tmpfs', mount]);
-  if (mounted.status !== 0) {
-    rmSync(mount, { recursive: true });
-    return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
-  }
-  const d = new Daemon(path.join(mount, 'data'), ['--disk-reserve', '4M'], {});
-  t.after(async () => {
-    if (d.child) await d.stop();
-    execFileSync('umount', ['-l', mount]);
-    rmSync(mount, { recursive: true });
-  });
-  await d.start();
+  const on = await daemonOnDisk(t, '24m', '4M');
+  if (!on) return;
+  const { d, mount } = on;
   for (let n = 0; n < 12; n++) assert.equal((await d.upload(padded(n))).status, 201);
   stops(await backup(path.join(mount, 'backup'), d.data, '4M'));
   assert.equal((await d.upload(padded(12))).status, 201);

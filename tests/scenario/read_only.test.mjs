@@ -2,27 +2,22 @@
 // it runs. The test mounts file systems; it is skipped if that is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
-import { mkdtempSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { assertProblem, binaries, Daemon } from './support/daemon.mjs';
+import { memoryDisk } from './support/disk.mjs';
 import * as shapes from './support/shapes.mjs';
 
 test('a read-only data folder is named as such', async (t) => {
-  const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-ro-'));
-  const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=64m', 'tmpfs', mount]);
-  if (mounted.status !== 0) {
-    rmSync(mount, { recursive: true });
-    return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
-  }
+  const disk = memoryDisk(t, '64m');
+  if (!disk) return;
+  const mount = disk.folder;
   const data = path.join(mount, 'data');
   const d = new Daemon(data, ['--scrub-rate', '0', '--disk-reserve', '0'], {});
   t.after(async () => {
     if (d.child) await d.stop('SIGKILL');
     spawnSync('umount', ['-l', data]);
-    execFileSync('umount', ['-l', mount]);
-    rmSync(mount, { recursive: true });
+    disk.unmount();
   });
   await d.start();
   const text = shapes.obj(shapes.egg(2));
