@@ -29,8 +29,7 @@ typedef struct haul {
 
 static const char no_space[] =
     "would have less space left than disk-reserve asks for, or twice as much on the disk of the data folder: free "
-    "some, "
-    "or lower --disk-reserve, and run this again; to use another disk, delete this folder";
+    "some, or lower --disk-reserve, and run this again; to use another disk, delete this folder";
 
 static int complain(const char *folder, const char *why) {
   fprintf(stderr, "orbmorphd: %s %s\n", folder, why);

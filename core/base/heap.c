@@ -38,3 +38,9 @@ int orb_heap_is_kept(void) {
   return 0;
 #endif
 }
+
+void orb_heap_give_back(void) {
+#if defined(__GLIBC__)
+  (void)malloc_trim(0);
+#endif
+}

@@ -13,9 +13,6 @@
 #if defined(__linux__)
 #include <sys/mman.h>
 #endif
-#if defined(__GLIBC__)
-#include <malloc.h>
-#endif
 
 #include "base/check.h"
 #include "base/error.h"
@@ -77,17 +74,12 @@ static void raise_to(atomic_size_t *most, size_t value) {
 /* A heap that keeps what is freed (orb_keep_heap()) holds more than what is in use. Both together stay within the
  * limit: what is kept goes back where the limit has no more room for it. */
 static void give_back(const orb_context *ctx, size_t used) {
-#if defined(__GLIBC__)
   orb_context *root = ctx->root;
   const size_t heap = atomic_load(&root->heap_used), held = atomic_load(&root->heap_held);
   if (held > heap && used + (held - heap) > ctx->options.memory_limit) {
-    (void)malloc_trim(0);
+    orb_heap_give_back();
     atomic_store(&root->heap_held, heap);
   }
-#else
-  (void)ctx;
-  (void)used;
-#endif
 }
 
 static int charge(orb_context *ctx, size_t total, int mapped) {
