@@ -228,6 +228,11 @@ static const double ORB_FIND_WALKS_EARLY = 0.14;
  * Of 41 pairs, the shape that moved with less energy both ways was the less round one in 35; in the others the volumes
  * were closer than this, but for two. */
 static const double ORB_FIND_LESS_ROUND = 0.8;
+/* Two shapes with landmarks are about as round if the volume of one is more than this share of that of the other, at
+ * the same area. Of 240 alignments of people and animals in both orders, the 148 with a smaller share had 4 % less
+ * error with the less round one first (12 % where proportions differ); the other 92 had 1 % less with the rounder one
+ * first (4 % where both are one animal in two poses). */
+static const double ORB_FIND_AS_ROUND = 0.95;
 /* The finished walk of the next best match replaces that of the best one if it exceeds 1 by less than this share of
  * what that does: walks of one match differ by as much. */
 static const double ORB_FIND_CONTEST_GAIN = 0.95;

@@ -31,8 +31,10 @@ ORB_API void orb_align_defaults(orb_align_options *options);
  * - auto: pin if there are landmarks. Without landmarks, auto first searches for rotations, then matches each later
  *   shape with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both
  *   shapes least. The composed map sends each vertex to where the match takes it. The preset fast only searches for
- *   rotations. `found` shows what was matched. Of two shapes without landmarks, the less round one, which has less
- *   volume at the same area, counts as the first, so both orders have the same map; two with holes are taken as given.
+ *   rotations. `found` shows what was matched.
+ *
+ * Of two shapes, pin and auto choose which one counts as the first here, mostly the less round one, which has less
+ * volume at the same area: both orders have the same map. Two with holes are taken as given.
  *
  * Landmarks at the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * landmarks that are out of range or share a place on some shapes only. If the landmarks cannot all be met, it names
