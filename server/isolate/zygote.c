@@ -21,7 +21,7 @@
 #include "orbmorph/context.h"
 
 enum { PASSED_MOST = 3, HELLO_MS = 60000, PROCESSES = 1024, STATUS_MS = 2000 };
-/* A process closes its channel when it exits, and has its status well within a millisecond of that. One that still runs
+/* A process closes its channel when it exits, and has ended well within a millisecond of that. One that still runs
  * after this many is killed. */
 enum { ENDING_MS = 20 };
 
@@ -479,13 +479,15 @@ int isolate_close(isolated *p) {
     close(p->channel);
   }
   if (p->status >= 0) {
-    /* It has ended, or ends within moments of its last frame; else it is killed, which says nothing of it. */
-    struct pollfd end = {.fd = p->status, .events = POLLIN};
+    /* It has ended, or ends within moments of its last frame; else it is killed, which says nothing of it. Its status
+     * comes later where the processor is busy: another process reports that. */
+    struct pollfd end = {.fd = p->pidfd, .events = POLLIN}, reported = {.fd = p->status, .events = POLLIN};
     const int runs = p->pidfd >= 0 && poll(&end, 1, ENDING_MS) <= 0;
     if (runs) {
       (void)syscall(SYS_pidfd_send_signal, p->pidfd, SIGKILL, NULL, 0);
     }
-    if (p->pidfd >= 0 && (poll(&end, 1, STATUS_MS) <= 0 || read(p->status, &status, sizeof status) != sizeof status)) {
+    if (p->pidfd >= 0 &&
+        (poll(&reported, 1, STATUS_MS) <= 0 || read(p->status, &status, sizeof status) != sizeof status)) {
       status = -1;
     }
     status = runs && WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL ? -1 : status;
