@@ -340,6 +340,21 @@ static int write_halfway(const truth_run *run, const char *key, orb_fit fit, api
   return fine;
 }
 
+/* The share of the area that each kind of warning is about; 0: there is none. */
+static void write_warned(const orb_merge_result *result, api_text *line) {
+  double share[2] = {0};
+  for (int32_t i = 0; i < result->warning_count; i++) {
+    const orb_warning *warning = &result->warnings[i];
+    double *of = &share[warning->kind == ORB_WARNING_THIN];
+    *of = warning->share > *of ? warning->share : *of;
+  }
+  api_json_key(line, "warned");
+  api_json_open(line, '{');
+  api_json_member_number(line, "stretched", share[0]);
+  api_json_member_number(line, "thin", share[1]);
+  api_json_close(line, '}');
+}
+
 /* The mean of the confidences of the found landmarks; null if the search did not run. */
 static void write_confidence(const orb_alignment *alignment, api_text *line) {
   double sum = 0;
@@ -387,6 +402,7 @@ static int write_measures(truth_run *run, api_text *line) {
     write_confidence(alignment, line);
     write_match(alignment, line);
     api_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
+    write_warned(run->result, line);
     write_inverted(run, line);
     fine = write_dense(run, line) && write_held_out(run, line) && write_halfway(run, "halfway", ORB_FIT_NONE, line) &&
            write_halfway(run, "halfway_fitted", ORB_FIT_RIGID, line);

@@ -41,6 +41,7 @@ from surface import Surface, cross, dot, minus
 RIGHT = 10
 GIVEN_MOST = 24  # landmarks: however few are given, the same places are measured, those after this many
 FORMAT = 3  # the version of the files in the store: after a change everything is measured
+THIN = (0, 0.005, 0.01)  # shares of the surface in patches that are thin halfway
 CURVE = (1, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50)
 PAIR_COLUMNS = ["set", "pair", "kind", "half", "version", "given", "mean", "median", "95 %", "right", "% diagonal",
                 "energy", "confidence", "thin %", "CPU s"]
@@ -117,7 +118,8 @@ def measure(program, pair, given, change, options):
             "diagonal": [round(100 * math.dist(targets[i], image) / second.diagonal, 3)
                          for i, image in zip(held, images)],
             "parts": [places[i][2] for i in held], "cpu": round(cpu, 2), "energy": line["energy"],
-            "confidence": line.get("confidence"), "match": line.get("match"), "halfway": line["halfway_fitted"]}
+            "confidence": line.get("confidence"), "match": line.get("match"), "halfway": line["halfway_fitted"],
+            "warned": line.get("warned")}
 
 
 def spread(places, count):
@@ -217,6 +219,19 @@ def confidence_rows(results):
     return rows
 
 
+def warning_rows(results):
+    """Of the maps with patches that are thin halfway: how many have a warning that says where."""
+    rows = []
+    for name in dict.fromkeys(r[1] for r in results):
+        good = [r[3] for r in results if r[1] == name and "failed" not in r[3] and r[3].get("warned")]
+        for least in THIN:
+            thin = [r for r in good if r["halfway"]["thin_fraction"] > least]
+            if thin:
+                warned = sum(r["warned"]["thin"] > 0 for r in thin)
+                rows.append([name, f"more than {100 * least:.1f} %", str(len(thin)), str(warned)])
+    return rows
+
+
 def is_right(result):
     return "failed" not in result and statistics.mean(result["errors"]) <= RIGHT
 
@@ -243,6 +258,9 @@ def report(results):
     confidence = confidence_rows(results)
     if confidence:
         text += "\n## Confidence\n\n" + table(["version", "confidence", "pairs", "right"], confidence)
+    warnings = warning_rows(results)
+    if warnings:
+        text += "\n## Warnings\n\n" + table(["version", "thin", "maps", "with a warning"], warnings)
     verdicts = verdict_rows(results)
     if verdicts:
         text += "\n## Changes\n\n" + table(["version", "given", "pairs", "same verdict", "right in both"], verdicts)
