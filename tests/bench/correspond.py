@@ -42,6 +42,7 @@ RIGHT = 10
 GIVEN_MOST = 24  # landmarks: however few are given, the same places are measured, those after this many
 FORMAT = 3  # the version of the files in the store: after a change everything is measured
 THIN = (0, 0.005, 0.01)  # shares of the surface in patches that are thin halfway
+MORE_LANDMARKS = 1.05  # a pair with more landmarks is no worse if its mean error is at most this times as large
 CURVE = (1, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50)
 PAIR_COLUMNS = ["set", "pair", "kind", "half", "version", "given", "mean", "median", "95 %", "right", "% diagonal",
                 "energy", "confidence", "thin %", "CPU s"]
@@ -232,6 +233,21 @@ def warning_rows(results):
     return rows
 
 
+def landmark_rows(results):
+    """From few landmarks to more: how many pairs have about as little error with more."""
+    means = {}
+    for pair, name, given, result in results:
+        if "failed" not in result:
+            means.setdefault(name, {}).setdefault(given, {})[pair.set, pair.name] = statistics.mean(result["errors"])
+    rows = []
+    for name, by_given in means.items():
+        for few, more in zip(sorted(by_given), sorted(by_given)[1:]):
+            both = [(value, by_given[more][key]) for key, value in by_given[few].items() if key in by_given[more]]
+            kept = sum(after <= MORE_LANDMARKS * before for before, after in both)
+            rows.append([name, str(few), str(more), str(len(both)), str(kept)])
+    return rows
+
+
 def is_right(result):
     return "failed" not in result and statistics.mean(result["errors"]) <= RIGHT
 
@@ -258,6 +274,9 @@ def report(results):
     confidence = confidence_rows(results)
     if confidence:
         text += "\n## Confidence\n\n" + table(["version", "confidence", "pairs", "right"], confidence)
+    more = landmark_rows(results)
+    if more:
+        text += "\n## More landmarks\n\n" + table(["version", "given", "more", "pairs", "no worse"], more)
     warnings = warning_rows(results)
     if warnings:
         text += "\n## Warnings\n\n" + table(["version", "thin", "maps", "with a warning"], warnings)
