@@ -176,7 +176,7 @@ static orb_status align_by_rotation(orb_context *ctx, const orb_align_shape shap
   return orb_align_given(ctx, shapes, 2, NULL, 0, &rotated, other);
 }
 
-/* Swaps the two shapes of an alignment without landmarks and rims, and the places of its alternatives. */
+/* Swaps the two shapes of an alignment without rims, with their landmarks, and the places of its alternatives. */
 static void swap_shapes(orb_alignment *a) {
   const orb_aligned_shape first = a->shapes[0];
   a->shapes[0] = a->shapes[1];
@@ -351,6 +351,33 @@ static orb_status align_swapped(orb_context *ctx, const orb_align_shape shapes[2
   return status;
 }
 
+static orb_status align_in_order(orb_context *ctx, int swaps, const orb_align_shape shapes[2],
+                                 const orb_landmark *landmarks, int32_t landmark_count,
+                                 const orb_align_options *options, orb_alignment *out, double *energy) {
+  return swaps ? align_swapped(ctx, shapes, landmarks, landmark_count, options, out, energy)
+               : align_ordered(ctx, shapes, 2, landmarks, landmark_count, options, out, energy);
+}
+
+/* Aligns two shapes in the order that leads nearer to the truth. Where the landmarks cannot be met in that order, the
+ * other one may have room for them. The error names shapes as the request does, so it is that of its order. */
+static orb_status align_pair(orb_context *ctx, const orb_align_shape shapes[2], const orb_landmark *landmarks,
+                             int32_t landmark_count, const orb_align_options *options, orb_alignment *out,
+                             double *energy) {
+  const orb_map_params params = orb_map_params_of(options->preset);
+  const int swaps = first_of_pair(shapes, landmark_count, &params);
+  orb_status status = align_in_order(ctx, swaps, shapes, landmarks, landmark_count, options, out, energy);
+  if (status != ORB_E_BAD_LANDMARKS || are_open(shapes)) {
+    return status;
+  }
+  const orb_error first = *orb_context_error(ctx);
+  orb_alignment_free(ctx, out);
+  status = align_in_order(ctx, !swaps, shapes, landmarks, landmark_count, options, out, energy);
+  if (status == ORB_E_BAD_LANDMARKS && !swaps) {
+    *orb_context_error_edit(ctx) = first;
+  }
+  return status;
+}
+
 orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                      const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                      orb_alignment *out) {
@@ -359,10 +386,9 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
   const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
   const int is_pair = shape_count == 2 && (options->method == ORB_ALIGN_AUTO || options->method == ORB_ALIGN_PIN);
-  const orb_map_params params = orb_map_params_of(options->preset);
   double energy = INFINITY;
-  orb_status status = is_pair && first_of_pair(shapes, landmark_count, &params)
-                          ? align_swapped(ctx, shapes, landmarks, landmark_count, options, out, &energy)
+  orb_status status = is_pair
+                          ? align_pair(ctx, shapes, landmarks, landmark_count, options, out, &energy)
                           : align_ordered(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &energy);
   if (status == ORB_OK) {
     status = describe(ctx, shapes, landmarks, landmark_count, options, energy, out);

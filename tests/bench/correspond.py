@@ -23,6 +23,7 @@ import argparse
 import concurrent.futures
 import functools
 import hashlib
+import itertools
 import json
 import math
 import os
@@ -234,16 +235,16 @@ def warning_rows(results):
 
 
 def landmark_rows(results):
-    """From few landmarks to more: how many pairs have about as little error with more."""
+    """From few landmarks to more: how many pairs have about as little error with more. A failure has the most."""
     means = {}
     for pair, name, given, result in results:
-        if "failed" not in result:
-            means.setdefault(name, {}).setdefault(given, {})[pair.set, pair.name] = statistics.mean(result["errors"])
+        error = math.inf if "failed" in result else statistics.mean(result["errors"])
+        means.setdefault(name, {}).setdefault(given, {})[pair.set, pair.name] = error
     rows = []
     for name, by_given in means.items():
-        for few, more in zip(sorted(by_given), sorted(by_given)[1:]):
+        for few, more in itertools.combinations(sorted(by_given), 2):
             both = [(value, by_given[more][key]) for key, value in by_given[few].items() if key in by_given[more]]
-            kept = sum(after <= MORE_LANDMARKS * before for before, after in both)
+            kept = sum(after <= MORE_LANDMARKS * before and after < math.inf for before, after in both)
             rows.append([name, str(few), str(more), str(len(both)), str(kept)])
     return rows
 

@@ -104,6 +104,19 @@ class Correspond(unittest.TestCase):
         self.assertLess(statistics.mean(result["errors"]), 0.2)
         self.assertGreater(result["cpu"], 0.1)
 
+    def test_more_landmarks_and_warnings_are_counted(self):
+        def result(error, thin=0, warned=0):
+            return {"errors": [error], "halfway": {"thin_fraction": thin}, "warned": {"thin": warned}}
+
+        pairs = [correspond_pairs.Pair("animals", name, "", "choose", None, None, None) for name in "ab"]
+        results = [(pairs[0], "now", 0, result(2)), (pairs[1], "now", 0, result(2, thin=0.02)),
+                   (pairs[0], "now", 8, result(2.09)), (pairs[1], "now", 8, {"failed": "", "cpu": 1}),
+                   (pairs[0], "now", 24, result(3, thin=0.007, warned=0.01)), (pairs[1], "now", 24, result(1))]
+        self.assertEqual(correspond.landmark_rows(results),
+                         [["now", "0", "8", "2", "1"], ["now", "0", "24", "2", "1"], ["now", "8", "24", "2", "1"]])
+        self.assertEqual(correspond.warning_rows(results), [["now", "more than 0.0 %", "2", "1"], ["now", "more than 0.5 %", "2", "1"],
+                                                            ["now", "more than 1.0 %", "1", "0"]])
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])

@@ -332,9 +332,41 @@ static void order_changes_nothing_with_landmarks(void **unused) {
   }
 }
 
+/* Two landmarks share a place on one shape only. In both orders the error names that shape as the request does. */
+static void errors_name_shapes_of_the_request(void **unused) {
+  orb_context *ctx;
+  orb_mesh mesh[2];
+  orb_embedding embedding[2];
+  orb_align_shape shapes[2];
+  orb_align_options options;
+  (void)unused;
+  orb_align_defaults(&options);
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  make_creatures(ctx, 0, (const int[2]){3, 3}, mesh, embedding, shapes);
+  for (int first = 0; first < 2; first++) {
+    const orb_align_shape ordered[2] = {shapes[first], shapes[1 - first]};
+    const orb_mesh pair[2] = {*ordered[0].mesh, *ordered[1].mesh};
+    orb_landmark landmarks[LIMBS];
+    orb_place at[LIMBS][2];
+    int32_t tip[2][LIMBS];
+    orb_alignment out;
+    mark_tips(ctx, pair, tip, at, landmarks);
+    at[1][first] = at[0][first]; /* on the creature with long limbs */
+    assert_int_equal(orb_align(ctx, ordered, 2, landmarks, LIMBS, &options, &out), ORB_E_BAD_LANDMARKS);
+    assert_int_equal(orb_context_error(ctx)->shape, first);
+    assert_non_null(strstr(orb_context_error(ctx)->detail, first == 0 ? "on shape 0" : "on shape 1"));
+  }
+  for (int s = 0; s < 2; s++) {
+    orb_embedding_free(ctx, &embedding[s]);
+    shape_free(ctx, &mesh[s]);
+  }
+  orb_context_destroy(ctx);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(order_changes_nothing),
                                      cmocka_unit_test(order_changes_nothing_with_landmarks),
+                                     cmocka_unit_test(errors_name_shapes_of_the_request),
                                      cmocka_unit_test(landmarks_meet)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

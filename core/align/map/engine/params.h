@@ -114,17 +114,17 @@ typedef struct orb_map_params {
                       more than this factor. With 1.25 to 1.32 three pairs of people came to 1.06 to 1.13 from it, two
                       of them to 1.10 and 1.25 from a coarser one; with 1.38 to 1.54 two pairs came to 1.22 to 1.88, and
                       to 1.14 to 1.23 from a coarser one */
-    double crumpled;  /* energy of the first start up to which it is drawn at once */
-    double drawn;     /* energy above which the map is not drawn: it stays caught */
-    int passes;       /* 1: passes follow (targets.c) */
-    double gain;      /* a map is drawn again if the first draw has brought the energy below this share. In 38 runs of
-                         people, animals of both halves and others, the second draw gained at most 0.1 % after a smaller
-                         gain (23 runs), and up to 4 % after a larger one. With `quality` it always is */
-    double contested; /* energy of a pose above which pins compete with it, as a rival or afterwards. Of seven poses of
-                         1.26 to 1.37, pins took two fifths of the CPU time, and won in two, by 0.1 and 2 % of the
-                         energy and none of the error */
+    double crumpled;    /* energy of the first start up to which it is drawn at once */
+    double drawn;       /* energy above which the map is not drawn: it stays caught */
+    int passes;         /* 1: passes follow (targets.c) */
+    double gain;        /* a map is drawn again if the first draw has brought the energy below this share. In 38 runs of
+                           people, animals of both halves and others, the second draw gained at most 0.1 % after a smaller
+                           gain (23 runs), and up to 4 % after a larger one. With `quality` it always is */
+    double contested;   /* energy of a pose above which pins compete with it, as a rival or afterwards: energy.poor. Of
+                           seven poses below it (1.26 to 1.37), pins took two fifths of the CPU time; they won in two,
+                           by 0.1 and 2 % of the energy and none of the error */
     double asked_first; /* energy above which it is asked before the map is drawn, which is work in vain if the rival
-                           wins. Draws bring people from up to 1.3 to below 1.25 */
+                           wins. A draw takes up to a tenth off the energy, which may bring a map below `contested` */
   } targets;
 
   /* The quick way: a landmark walk optimised on a coarse level. */
