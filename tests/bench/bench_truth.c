@@ -345,13 +345,13 @@ static void write_warned(const orb_merge_result *result, api_text *line) {
   double share[2] = {0};
   for (int32_t i = 0; i < result->warning_count; i++) {
     const orb_warning *warning = &result->warnings[i];
-    double *of = &share[warning->kind == ORB_WARNING_THIN];
+    double *of = &share[warning->kind];
     *of = warning->share > *of ? warning->share : *of;
   }
   api_json_key(line, "warned");
   api_json_open(line, '{');
-  api_json_member_number(line, "stretched", share[0]);
-  api_json_member_number(line, "thin", share[1]);
+  api_json_member_number(line, "stretched", share[ORB_WARNING_STRETCHED]);
+  api_json_member_number(line, "thin", share[ORB_WARNING_THIN]);
   api_json_close(line, '}');
 }
 

@@ -40,6 +40,13 @@ static void make_creatures(orb_context *ctx, int lean, const int levels[2], orb_
   }
 }
 
+static void free_creatures(orb_context *ctx, orb_mesh mesh[2], orb_embedding embedding[2]) {
+  for (int s = 0; s < 2; s++) {
+    orb_embedding_free(ctx, &embedding[s]);
+    shape_free(ctx, &mesh[s]);
+  }
+}
+
 /* Holds a contest between two embedded shapes. */
 static void hold(orb_context *ctx, const orb_align_shape shapes[2], outcome *out) {
   orb_even_shapes even;
@@ -103,10 +110,7 @@ static void assert_contest(int lean) {
     assert_true(out.alignment.energy == energy);
     orb_alignment_free(ctx, &out.alignment);
     orb_match_free(ctx, &out.match);
-    for (int s = 0; s < 2; s++) {
-      orb_embedding_free(ctx, &embedding[s]);
-      shape_free(ctx, &mesh[s]);
-    }
+    free_creatures(ctx, mesh, embedding);
     orb_context_destroy(ctx);
   }
   test_free(first[0]);
@@ -129,12 +133,12 @@ typedef struct marked {
 } marked;
 
 /* Landmarks at the tips of the limbs of two creatures. tip: their vertices. */
-static void mark_tips(orb_context *ctx, const orb_mesh mesh[2], int32_t tip[2][LIMBS], orb_place at[LIMBS][2],
+static void mark_tips(orb_context *ctx, const orb_align_shape shapes[2], int32_t tip[2][LIMBS], orb_place at[LIMBS][2],
                       orb_landmark landmarks[LIMBS]) {
   for (int i = 0; i < LIMBS; i++) {
     for (int s = 0; s < 2; s++) {
-      tip[s][i] = shape_farthest(&mesh[s], limb[i]);
-      assert_int_equal(orb_place_of_vertex(ctx, &mesh[s], tip[s][i], &at[i][s]), ORB_OK);
+      tip[s][i] = shape_farthest(shapes[s].mesh, limb[i]);
+      assert_int_equal(orb_place_of_vertex(ctx, shapes[s].mesh, tip[s][i], &at[i][s]), ORB_OK);
     }
     landmarks[i] = (orb_landmark){.at = at[i], .confidence = 1, .weight = 1};
   }
@@ -150,7 +154,7 @@ static void marked_open(orb_context *ctx, int lean, marked *m) {
   options.method = ORB_ALIGN_ROTATE;
   memset(m, 0, sizeof *m);
   make_creatures(ctx, lean, (const int[2]){4, 4}, m->mesh, m->embedding, shapes);
-  mark_tips(ctx, m->mesh, tip, at, landmarks);
+  mark_tips(ctx, shapes, tip, at, landmarks);
   assert_int_equal(orb_even_shapes_create(ctx, shapes, 2, &m->even), ORB_OK);
   assert_int_equal(orb_align(ctx, m->even.shapes, 2, landmarks, LIMBS, &options, &m->alignment), ORB_OK);
   const orb_match_hint hint = {.count = LIMBS,
@@ -168,10 +172,7 @@ static void marked_close(orb_context *ctx, marked *m) {
   orb_alignment_free(ctx, &m->alignment);
   orb_match_free(ctx, &m->match);
   orb_even_shapes_free(ctx, &m->even);
-  for (int s = 0; s < 2; s++) {
-    orb_embedding_free(ctx, &m->embedding[s]);
-    shape_free(ctx, &m->mesh[s]);
-  }
+  free_creatures(ctx, m->mesh, m->embedding);
 }
 
 /* Holds a contest of two creatures in which a map of no energy is known, and a contest in which none is. */
@@ -242,13 +243,18 @@ static void assert_same_places(const orb_place *a, const orb_place *swapped, int
   }
 }
 
-static void assert_same_swapped(const orb_mesh mesh[2], const orb_alignment *a, const orb_alignment *swapped) {
+static void assert_same_map(const orb_alignment *a, const orb_alignment *swapped) {
   assert_true(a->energy == swapped->energy);
-  assert_memory_equal(&a->match, &swapped->match, sizeof a->match);
   for (int s = 0; s < 2; s++) {
-    assert_memory_equal(a->shapes[s].points, swapped->shapes[1 - s].points,
-                        3 * (size_t)mesh[s].vertex_count * sizeof(double));
+    const orb_aligned_shape *one = &a->shapes[s], *other = &swapped->shapes[1 - s];
+    assert_int_equal(one->mesh.vertex_count, other->mesh.vertex_count);
+    assert_memory_equal(one->points, other->points, 3 * (size_t)one->mesh.vertex_count * sizeof(double));
   }
+}
+
+static void assert_same_swapped(const orb_alignment *a, const orb_alignment *swapped) {
+  assert_same_map(a, swapped);
+  assert_memory_equal(&a->match, &swapped->match, sizeof a->match);
   assert_true(a->alternative_count > 0);
   assert_int_equal(a->alternative_count, swapped->alternative_count);
   for (int32_t i = 0; i < a->alternative_count; i++) {
@@ -274,12 +280,10 @@ static void order_changes_nothing(void **unused) {
     for (int first = 0; first < 2; first++) {
       align_in_order(ctx, shapes, first, &out[first]);
     }
-    assert_same_swapped(mesh, &out[0], &out[1]);
-    for (int s = 0; s < 2; s++) {
-      orb_alignment_free(ctx, &out[s]);
-      orb_embedding_free(ctx, &embedding[s]);
-      shape_free(ctx, &mesh[s]);
-    }
+    assert_same_swapped(&out[0], &out[1]);
+    orb_alignment_free(ctx, &out[0]);
+    orb_alignment_free(ctx, &out[1]);
+    free_creatures(ctx, mesh, embedding);
     orb_context_destroy(ctx);
   }
 }
@@ -287,14 +291,13 @@ static void order_changes_nothing(void **unused) {
 /* Aligns two creatures in this order of the shapes by the tips of their limbs. */
 static void align_marked(orb_context *ctx, const orb_align_shape shapes[2], int first, orb_alignment *out) {
   const orb_align_shape ordered[2] = {shapes[first], shapes[1 - first]};
-  const orb_mesh mesh[2] = {*ordered[0].mesh, *ordered[1].mesh};
   orb_landmark landmarks[LIMBS];
   orb_place at[LIMBS][2];
   int32_t tip[2][LIMBS];
   orb_align_options options;
   orb_align_defaults(&options);
   options.preset = ORB_PRESET_DEFAULT;
-  mark_tips(ctx, mesh, tip, at, landmarks);
+  mark_tips(ctx, ordered, tip, at, landmarks);
   align_and_check(ctx, ordered, 2, landmarks, LIMBS, &options, out);
 }
 
@@ -316,18 +319,14 @@ static void order_changes_nothing_with_landmarks(void **unused) {
     for (int first = 0; first < 2; first++) {
       align_marked(ctx, shapes, first, &out[first]);
     }
-    assert_true(out[0].energy == out[1].energy);
+    assert_same_map(&out[0], &out[1]);
     for (int s = 0; s < 2; s++) {
-      const orb_aligned_shape *a = &out[0].shapes[s], *swapped = &out[1].shapes[1 - s];
-      assert_int_equal(a->mesh.vertex_count, swapped->mesh.vertex_count);
-      assert_memory_equal(a->points, swapped->points, 3 * (size_t)a->mesh.vertex_count * sizeof(double));
-      assert_memory_equal(a->landmark_vertices, swapped->landmark_vertices, LIMBS * sizeof(int32_t));
+      assert_memory_equal(out[0].shapes[s].landmark_vertices, out[1].shapes[1 - s].landmark_vertices,
+                          LIMBS * sizeof(int32_t));
     }
-    for (int s = 0; s < 2; s++) {
-      orb_alignment_free(ctx, &out[s]);
-      orb_embedding_free(ctx, &embedding[s]);
-      shape_free(ctx, &mesh[s]);
-    }
+    orb_alignment_free(ctx, &out[0]);
+    orb_alignment_free(ctx, &out[1]);
+    free_creatures(ctx, mesh, embedding);
     orb_context_destroy(ctx);
   }
 }
@@ -345,21 +344,17 @@ static void errors_name_shapes_of_the_request(void **unused) {
   make_creatures(ctx, 0, (const int[2]){3, 3}, mesh, embedding, shapes);
   for (int first = 0; first < 2; first++) {
     const orb_align_shape ordered[2] = {shapes[first], shapes[1 - first]};
-    const orb_mesh pair[2] = {*ordered[0].mesh, *ordered[1].mesh};
     orb_landmark landmarks[LIMBS];
     orb_place at[LIMBS][2];
     int32_t tip[2][LIMBS];
     orb_alignment out;
-    mark_tips(ctx, pair, tip, at, landmarks);
+    mark_tips(ctx, ordered, tip, at, landmarks);
     at[1][first] = at[0][first]; /* on the creature with long limbs */
     assert_int_equal(orb_align(ctx, ordered, 2, landmarks, LIMBS, &options, &out), ORB_E_BAD_LANDMARKS);
     assert_int_equal(orb_context_error(ctx)->shape, first);
     assert_non_null(strstr(orb_context_error(ctx)->detail, first == 0 ? "on shape 0" : "on shape 1"));
   }
-  for (int s = 0; s < 2; s++) {
-    orb_embedding_free(ctx, &embedding[s]);
-    shape_free(ctx, &mesh[s]);
-  }
+  free_creatures(ctx, mesh, embedding);
   orb_context_destroy(ctx);
 }
 
