@@ -369,12 +369,18 @@ static orb_status align_pair(orb_context *ctx, const orb_align_shape shapes[2], 
   if (status != ORB_E_BAD_LANDMARKS || are_open(shapes)) {
     return status;
   }
-  const orb_error first = *orb_context_error(ctx);
+  orb_error *first = ORB_NEW(ctx, orb_error, 1); /* too large for the stack of a thread */
+  if (!first) {
+    return ORB_E_NO_MEMORY;
+  }
+  *first = *orb_context_error(ctx);
+  orb_error_clear(ctx);
   orb_alignment_free(ctx, out);
   status = align_in_order(ctx, !swaps, shapes, landmarks, landmark_count, options, out, energy);
   if (status == ORB_E_BAD_LANDMARKS && !swaps) {
-    *orb_context_error_edit(ctx) = first;
+    *orb_context_error_edit(ctx) = *first;
   }
+  orb_free(ctx, first);
   return status;
 }
 
