@@ -8,8 +8,12 @@
 
 #include <cmocka.h>
 
+#include "align/map/levels.h"
 #include "align/map/twist/limb.h"
+#include "align/map/twist/patch.h"
 #include "align/map/twist/twist.h"
+#include "align/map/twist/untwist.h"
+#include "align/map/whole.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "support_shapes.h"
@@ -19,6 +23,8 @@
 static const double axis[3] = {0.6, 0, 0.8}, across[3] = {0, 1, 0}, third[3] = {-0.8, 0, 0.6};
 static const double REACH = 1.2;              /* of the limb beyond the ball */
 static const double FULL = 0.15, FADED = 0.7; /* angles from the axis between which a twist fades away */
+static const double WOUND = 1.5;              /* the same of a whole turn, which shears more */
+static const double ROOT = 1.55, BODY = 1.9;  /* the same for a lift */
 
 /* A ball with one limb, and its own directions as its sphere. */
 typedef struct creature {
@@ -44,9 +50,15 @@ static void rotate(const double about[3], double angle, double p[3]) {
   }
 }
 
+/* 1 up to `from`, 0 beyond `to`. */
+static double fading(double at, double from, double to) {
+  const double fade = fmin(1, fmax(0, (to - at) / (to - from)));
+  return fade * fade * (3 - 2 * fade);
+}
+
 /* A ball with one limb. twist: the rotation of the limb's end, counterclockwise as seen from outside; bend: that of the
- * mapped shape's limb. */
-static creature make(double reach, double twist, double bend) {
+ * mapped shape's limb, most at its tip; lift: the same of the limb as a whole. */
+static creature make_lifted(double reach, double twist, double bend, double lift) {
   creature c = {.pole = 0};
   assert_int_equal(orb_context_create(NULL, &c.ctx), ORB_OK);
   c.mesh = shape_ball(c.ctx, 6);
@@ -58,10 +70,9 @@ static creature make(double reach, double twist, double bend) {
   memcpy(c.sphere, c.mesh.positions, n * sizeof *c.sphere);
   memcpy(c.image, c.mesh.positions, n * sizeof *c.image);
   for (int32_t v = 0; v < c.mesh.vertex_count; v++) {
-    double *p = c.mesh.positions + 3 * (size_t)v, far = from_axis(p), fade = (FADED - far) / (FADED - FULL);
+    double *p = c.mesh.positions + 3 * (size_t)v, far = from_axis(p);
     c.pole = far < from_axis(c.sphere + 3 * (size_t)c.pole) ? v : c.pole;
-    fade = fmin(1, fmax(0, fade));
-    rotate(axis, twist * fade * fade * (3 - 2 * fade), c.image + 3 * (size_t)v);
+    rotate(axis, twist * fading(far, FULL, fabs(twist) > M_PI ? WOUND : FADED), c.image + 3 * (size_t)v);
     for (int k = 0; k < 3; k++) {
       p[k] *= 1 + reach * exp(-30 * (1 - cos(far)));
     }
@@ -72,12 +83,17 @@ static creature make(double reach, double twist, double bend) {
   for (int32_t v = 0; v < c.mesh.vertex_count; v++) {
     double out = orb_length(c.mesh.positions + 3 * (size_t)v);
     rotate(across, bend * (out - 1) / REACH, c.x + 3 * (size_t)v);
+    rotate(across, lift * fading(from_axis(c.sphere + 3 * (size_t)v), ROOT, BODY), c.x + 3 * (size_t)v);
   }
   for (int32_t t = 0; t < c.mesh.triangle_count; t++) {
     const int32_t *v = c.mesh.triangles + 3 * (size_t)t;
     assert_true(orb_orient(c.image + 3 * (size_t)v[0], c.image + 3 * (size_t)v[1], c.image + 3 * (size_t)v[2]) > 0);
   }
   return c;
+}
+
+static creature make(double reach, double twist, double bend) {
+  return make_lifted(reach, twist, bend, 0);
 }
 
 static void drop(creature *c) {
@@ -111,9 +127,10 @@ static void rotations_follow_the_rings(void **state) {
   double *height = malloc(n * sizeof *height);
   assert_true(inside && height);
   for (size_t v = 0; v < n; v++) {
-    inside[v] = from_axis(c.sphere + 3 * v) < FADED;
+    inside[v] = from_axis(c.sphere + 3 * v) < FADED ? ORB_MAP_LIMB : 0;
   }
-  assert_int_equal(orb_map_limb_heights(c.ctx, &params, &c.surface, inside, c.pole, height), ORB_OK);
+  inside[c.pole] = ORB_MAP_END;
+  assert_int_equal(orb_map_limb_heights(c.ctx, &params, &c.surface, inside, height), ORB_OK);
   for (int i = 0; i < 200; i++) {
     double far = 0.25 + 0.25 * i / 200, at = 0.7 * i, angle = (i % 9 - 4) * 0.8, p[3], q[3], wanted[3];
     for (int k = 0; k < 3; k++) {
@@ -142,6 +159,20 @@ static void rotations_follow_the_rings(void **state) {
   drop(&c);
 }
 
+/* How far all vertices are from where they belong, after this share of the twists is undone. */
+static double distance_left(const creature *c, const orb_map_twists *t, double share) {
+  double sum = 0;
+  for (int32_t v = 0; v < c->mesh.vertex_count; v++) {
+    orb_place place;
+    double y[3];
+    orb_locate(c->surface.locator, c->image + 3 * (size_t)v, -1, &place);
+    (void)orb_map_twists_undo(t, &c->surface, share, &place);
+    orb_map_surface_at(&c->surface, &place, y, NULL, NULL);
+    sum += sqrt(orb_distance2(y, c->surface.x + 3 * (size_t)v));
+  }
+  return sum;
+}
+
 /* Measures a twist with its sign, beyond half a turn as well, and undoes it. */
 static void twists_are_measured_and_undone(void **state) {
   (void)state;
@@ -160,21 +191,78 @@ static void twists_are_measured_and_undone(void **state) {
     assert_true(fabs(end * DEGREES - degrees[i / 2]) < 20);
     assert_true(fabs(fabs(end) - limb->most) < 1e-12);
     assert_true(t.kept < 0.99);
-    double before = 0, after = 0;
-    for (int32_t v = 0; v < c.mesh.vertex_count; v++) {
-      orb_place place;
-      double y[3];
-      orb_locate(c.surface.locator, c.image + 3 * (size_t)v, -1, &place);
-      orb_map_surface_at(&c.surface, &place, y, NULL, NULL);
-      before += sqrt(orb_distance2(y, c.x + 3 * (size_t)v));
-      (void)orb_map_twists_undo(&t, &c.surface, 1, &place);
-      orb_map_surface_at(&c.surface, &place, y, NULL, NULL);
-      after += sqrt(orb_distance2(y, c.x + 3 * (size_t)v));
-    }
-    assert_true(after < 0.25 * before);
+    assert_true(distance_left(&c, &t, 1) < 0.25 * distance_left(&c, &t, 0));
     orb_map_twists_free(c.ctx, &t);
     drop(&c);
   }
+}
+
+/* A vertex about this far from the axis. */
+static int32_t vertex_at(const creature *c, double far) {
+  int32_t best = 0;
+  for (int32_t v = 0; v < c->mesh.vertex_count; v++) {
+    const double off = fabs(from_axis(c->sphere + 3 * (size_t)v) - far);
+    best = off < fabs(from_axis(c->sphere + 3 * (size_t)best) - far) ? v : best;
+  }
+  return best;
+}
+
+/* Both ends of the limb are held, and the map winds what lies between by whole turns: they are counted and undone. What
+ * is held keeps its place, and there is no way between. */
+static void windings_between_held_vertices_are_undone(void **state) {
+  (void)state;
+  const struct {
+    double turns, lift;
+    int32_t held_beyond;
+  } rows[] = {{1, 0, 2}, {-1, 0, 3}, {1, 170, 2}, {-1, 170, 1}};
+  for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    creature c = make_lifted(REACH, rows[i].turns * 2 * M_PI, 0, rows[i].lift / DEGREES);
+    const int32_t held[4] = {vertex_at(&c, 1.52), c.pole, vertex_at(&c, 0.06), vertex_at(&c, 0.09)};
+    orb_map_twists t;
+    find(&c, held, 1 + rows[i].held_beyond, &t);
+    assert_int_equal(t.count, 1);
+    const orb_map_twist *limb = &t.limb[0];
+    assert_int_equal(limb->pole, -1);
+    assert_true(fabs(limb->angle[limb->count - 1] - rows[i].turns * 2 * M_PI) < 1e-9);
+    assert_true(distance_left(&c, &t, 1) < 0.25 * distance_left(&c, &t, 0));
+    assert_true(distance_left(&c, &t, 0.5) == distance_left(&c, &t, 0));
+    for (int32_t k = 0; k < 1 + rows[i].held_beyond; k++) {
+      orb_place place;
+      double y[3];
+      orb_locate(c.surface.locator, c.image + 3 * (size_t)held[k], -1, &place);
+      (void)orb_map_twists_undo(&t, &c.surface, 1, &place);
+      orb_map_surface_at(&c.surface, &place, y, NULL, NULL);
+      assert_true(sqrt(orb_distance2(y, c.surface.x + 3 * (size_t)held[k])) < 1e-3);
+    }
+    orb_map_twists_free(c.ctx, &t);
+    drop(&c);
+  }
+}
+
+/* The whole of it: the map of a wound tube is left for one of nearly no distortion, which no descent would reach. */
+static void a_wound_map_is_unwound(void **state) {
+  (void)state;
+  creature c = make(REACH, 2 * M_PI, 0);
+  int32_t held[3] = {vertex_at(&c, 1.52), c.pole, vertex_at(&c, 0.09)};
+  for (int i = 0; i < 3; i++) {
+    memcpy(c.image + 3 * (size_t)held[i], c.sphere + 3 * (size_t)held[i], sizeof(double[3]));
+  }
+  orb_aligned_shape fixed = {.mesh = c.mesh, .points = c.sphere, .landmark_vertices = held};
+  orb_aligned_shape moving = {.mesh = c.mesh, .points = c.image, .landmark_vertices = held};
+  const orb_map_guide guide = {.from = ORB_MAP_FROM_PINS};
+  double energy[2], after;
+  orb_map_run run = orb_map_run_of(c.ctx, &fixed, &moving, 0, 3, &guide, ORB_PRESET_DEFAULT);
+  assert_int_equal(orb_map_run_open(&run, &guide, energy), ORB_OK);
+  assert_true(energy[0] > 2);
+  assert_int_equal(orb_map_levels_prepare(&run), ORB_OK);
+  assert_int_equal(orb_map_untwist(&run, INFINITY), ORB_OK);
+  assert_int_equal(orb_map_energy_of(&run, run.best, INFINITY, &after), ORB_OK);
+  assert_true(after < 1.02); /* 1: an isometry */
+  for (int i = 0; i < 3; i++) {
+    assert_memory_equal(run.best + 3 * (size_t)held[i], c.sphere + 3 * (size_t)held[i], sizeof(double[3]));
+  }
+  orb_map_run_free(&run);
+  drop(&c);
 }
 
 static void nothing_is_found(double twist, double bend, int both_ends_held) {
@@ -209,6 +297,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(rotations_follow_the_rings),
       cmocka_unit_test(twists_are_measured_and_undone),
+      cmocka_unit_test(windings_between_held_vertices_are_undone),
+      cmocka_unit_test(a_wound_map_is_unwound),
       cmocka_unit_test(what_is_no_twist_stays),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -384,8 +384,10 @@ typedef struct orb_map_params {
     double rotated;           /* radians against the rotation of the whole: vertices beyond are examined */
     double twisted;           /* radians between root and tip: limbs beyond are untwisted */
     double smallest, largest; /* limb, as a share of the surface */
+    double largest_tube;      /* with what lies beyond: the end is the smaller side */
     int32_t band_vertices;    /* least of a ring, */
     int32_t bands;            /* and least rings of a limb: fewer do not show a twist */
+    double step;              /* radians between two rings of a wound limb: more may be a rotation the other way */
     double growth;            /* most rings that a part grows by, for 10,000 vertices; grows with their square root */
     double wider;             /* a ring this many times the narrowest is the root */
     int solve_steps;          /* most steps of conjugate gradients for the heights */

@@ -1,17 +1,18 @@
 /* Rings around a limb.
  *
- * A limb is a part of the surface that is a disc, with a pole at its end. Its height is the harmonic function that is 1
- * at the pole and 0 at the rim (cotangent Laplacian, Pinkall & Polthier 1993, with weights clamped from below so that
- * there is no other extremum). The level curves of the height are closed and run once around the pole. The conjugate of
- * the height grows along a level curve by the flux across it; both together are polar coordinates of the limb. So a
- * rotation along the rings, by one angle or by an angle that varies from ring to ring, is a one-to-one map of the limb,
- * whatever its shape.
+ * A limb is a part of the surface that is a disc, with a pole or a smaller disc at its end. Its height is the harmonic
+ * function that is 1 at the end and 0 at the rim (cotangent Laplacian, Pinkall & Polthier 1993, with weights clamped
+ * from below so that there is no other extremum). The level curves of the height are closed and run once around the
+ * end. The conjugate of the height grows along a level curve by the flux across it; both together are polar coordinates
+ * of the limb. So a rotation along the rings, by one angle or by an angle that varies from ring to ring, is a
+ * one-to-one map of the limb, whatever its shape.
  */
 #include "align/map/twist/limb.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "align/map/twist/patch.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
@@ -33,7 +34,7 @@ static double cotangent(const orb_map_surface *s, int32_t h) {
   return orb_dot(u, w) / (orb_length(n) + ORB_TINY);
 }
 
-/* The vertices inside except the pole, numbered from 2 on; 0 represents all vertices outside, 1 the pole. */
+/* The vertices of the limb, numbered from 2 on; 0 represents all vertices outside, 1 the end. */
 typedef struct system_of {
   int32_t count, links;
   int32_t *number; /* by vertex of the surface */
@@ -48,12 +49,12 @@ static void system_free(orb_context *ctx, system_of *s) {
 }
 
 static orb_status system_create(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
-                                const unsigned char *inside, int32_t pole, system_of *s) {
+                                const unsigned char *inside, system_of *s) {
   const double least = params->twist.least_weight;
   s->count = 2;
   s->number = ORB_NEW(ctx, int32_t, b->vertex_count);
   for (int32_t v = 0; s->number && v < b->vertex_count; v++) {
-    s->number[v] = v == pole ? 1 : inside[v] ? s->count++ : 0;
+    s->number[v] = inside[v] == ORB_MAP_END ? 1 : inside[v] ? s->count++ : 0;
   }
   for (int32_t h = 0; s->number && h < 3 * b->triangle_count; h++) {
     s->links += h < b->twin[h] && (s->number[b->triangles[h]] > 1 || s->number[b->triangles[orb_next(h)]] > 1);
@@ -126,11 +127,11 @@ static orb_status solve(orb_context *ctx, const orb_map_params *params, const sy
 }
 
 orb_status orb_map_limb_heights(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
-                                const unsigned char *inside, int32_t pole, double *height) {
+                                const unsigned char *inside, double *height) {
   system_of s = {0};
   double *work = NULL;
   orb_status status;
-  ORB_GO(status, system_create(ctx, params, b, inside, pole, &s), done);
+  ORB_GO(status, system_create(ctx, params, b, inside, &s), done);
   work = ORB_NEW(ctx, double, 4 * (size_t)s.count);
   if (!work) {
     status = ORB_E_NO_MEMORY;

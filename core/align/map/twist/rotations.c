@@ -15,7 +15,7 @@ typedef struct rotations_run {
   orb_context *ctx;
   const orb_map_surface *b;
   const orb_map_image *map;
-  double *back, *angle;
+  double *back, *rotation;
   orb_locator *locator; /* on the map's points */
 } rotations_run;
 
@@ -107,15 +107,13 @@ static double kept_halfway(const rotations_run *run, const double whole[9]) {
   return ends > 0 ? kept / ends : 1;
 }
 
-/* The angle of every vertex's surroundings against the whole, from their edges and normals on both shapes. */
-static orb_status measure_angles(rotations_run *run, double *kept) {
+/* The rotation of every vertex's surroundings, from their edges and normals on both shapes. */
+static orb_status measure_rotations(rotations_run *run) {
   const orb_map_surface *b = run->b;
-  double whole[9], *sum = ORB_NEW0(run->ctx, double, 16 * (size_t)b->vertex_count);
+  double *sum = ORB_NEW0(run->ctx, double, 16 * (size_t)b->vertex_count);
   if (!sum) {
     return ORB_E_NO_MEMORY;
   }
-  whole_rotation(run, whole);
-  *kept = kept_halfway(run, whole);
   for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
     size_t v = (size_t)b->triangles[h], q = (size_t)b->triangles[orb_next(h)], r = (size_t)b->triangles[orb_prev(h)];
     double y[2][3], x[2][3], n[3], *s = sum + 16 * v;
@@ -135,25 +133,34 @@ static orb_status measure_angles(rotations_run *run, double *kept) {
     }
   }
   for (int32_t v = 0; v < b->vertex_count; v++) {
-    double *s = sum + 16 * (size_t)v, r[9], trace = 0;
+    double *s = sum + 16 * (size_t)v, *r = run->rotation + 9 * (size_t)v;
     orb_normalize(s + 9);
     orb_normalize(s + 12);
     orb_add_outer(s, s + 9, s + 12, 0.5 * s[15]);
-    run->angle[v] = 0;
-    if (orb_nearest_rotation(s, r)) {
-      for (int k = 0; k < 9; k++) {
-        trace += r[k] * whole[k];
-      }
-      run->angle[v] = acos(fmin(1, fmax(-1, (trace - 1) / 2)));
+    if (!orb_nearest_rotation(s, r)) {
+      memset(r, 0, 9 * sizeof *r);
     }
   }
   orb_free(run->ctx, sum);
   return orb_context_check(run->ctx);
 }
 
+double orb_map_rotations_angle(const double a[9], const double b[9]) {
+  double trace = 0;
+  int defined[2] = {0, 0};
+  for (int k = 0; k < 9; k++) {
+    trace += a[k] * b[k];
+    defined[0] |= a[k] != 0;
+    defined[1] |= b[k] != 0;
+  }
+  return defined[0] && defined[1] ? acos(fmin(1, fmax(-1, (trace - 1) / 2))) : 0;
+}
+
 orb_status orb_map_rotations_measure(orb_context *ctx, const orb_map_surface *b, const orb_map_image *map, double *back,
-                                     double *angle, double *kept) {
-  rotations_run run = {.ctx = ctx, .b = b, .map = map, .back = back, .angle = angle};
+                                     double *rotation, double whole[9], double *kept) {
+  rotations_run run = {.ctx = ctx, .b = b, .map = map, .back = back, .rotation = rotation};
   ORB_TRY(trace_back(&run));
-  return measure_angles(&run, kept);
+  whole_rotation(&run, whole);
+  *kept = kept_halfway(&run, whole);
+  return measure_rotations(&run);
 }

@@ -11,10 +11,14 @@ typedef struct orb_map_image {
   const double *x, *points; /* 3 per vertex; without flips */
 } orb_map_image;
 
-/* For every vertex of the surface: where it comes from (back, 3 per vertex), and the angle by which the map rotates its
- * surroundings in space, against the rotation of the whole. *kept: as in orb_map_twists (twist.h). O(n). */
+/* For every vertex of the surface: where it comes from (back, 3 per vertex), and how the map rotates its surroundings
+ * in space (rotation, 9 per vertex; zeros where that is not defined). whole: the rotation of the whole, or the
+ * identity. *kept: as in orb_map_twists (twist.h). O(n). */
 ORB_MUST_CHECK orb_status orb_map_rotations_measure(orb_context *ctx, const orb_map_surface *b,
-                                                    const orb_map_image *map, double *back, double *angle,
-                                                    double *kept);
+                                                    const orb_map_image *map, double *back, double *rotation,
+                                                    double whole[9], double *kept);
+
+/* The angle between two rotations, in radians; 0 if one of them is not defined. */
+double orb_map_rotations_angle(const double a[9], const double b[9]);
 
 #endif

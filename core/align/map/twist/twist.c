@@ -4,293 +4,132 @@
  * is spread over a tube costs little energy, no landmark at the tip forbids it, and descent does not undo it, since it
  * is a minimum. Halfway through the morph the tube then collapses. Around every vertex of the fixed shape the map
  * rotates space; where that rotation is far from the one of the whole shape, a limb may be twisted. Such a part is
- * grown towards its root and cut into rings (limb.c). The rotation of each ring against the ring before it, around the
- * axis between their centres, is summed up from the root. If the sum is a twist, each ring is rotated back by the sum
- * up to it. A limb that is only posed differently has no such sum.
+ * grown towards its root and cut into rings (bands.c, limb.c). The rotation of each ring against the ring before it,
+ * around the axis between their centres, is summed up from the root. If the sum is a twist, each ring is rotated back
+ * by the sum up to it. A limb that is only posed differently has no such sum.
+ *
+ * Where landmarks hold both ends of a tube, such as elbow and hand, the map can only wind it by whole turns. The part
+ * that is rotated is then a ring between both ends. What lies beyond keeps its place, and the ring's own rings are
+ * rotated back by whole turns. No motion of the tube with both ends at rest leads there, so this is one step. A limb
+ * that is posed differently is rotated as a whole, landmarks and all; such rings are looked for relative to the
+ * rotation at each of these landmarks too.
  */
 #include "align/map/twist/twist.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "align/map/twist/bands.h"
 #include "align/map/twist/limb.h"
+#include "align/map/twist/patch.h"
 #include "base/check.h"
 #include "base/memory.h"
-#include "numeric/rotation.h"
-#include "numeric/vec3.h"
 
 static const double GROWTH_VERTICES = 1e4; /* vertices of a surface for which params.twist.growth counts rings */
-static const double NOT_PARALLEL = 0.7;    /* cosine: an axis at a greater angle is far from parallel to the limb's */
 
 typedef struct twist_run {
   orb_context *ctx;
   const orb_map_params *params;
   const orb_map_surface *b;
-  const orb_map_image *map;
-  double *back;    /* where each vertex of the surface comes from, 3 each */
-  double *height;  /* in the current limb */
-  double *rotated; /* angle of every vertex's surroundings against the whole */
-  int32_t *part;   /* representative of each vertex's part; union-find */
-  int32_t *corner; /* a half-edge out of each vertex */
-  int32_t *rim;    /* vertices at which a dilation starts */
-  int32_t rim_count;
-  unsigned char *held, *inside, *next, *taken; /* taken: in or next to an earlier limb */
+  double *back;            /* where each vertex of the surface comes from, 3 each */
+  double *rotation;        /* of the surroundings of each vertex, 9 each */
+  double whole[9];         /* rotation of the whole shape */
+  const double *reference; /* the rotation that parts are compared with: that of the whole, or at a held vertex */
+  double *height;          /* in the current limb */
+  orb_map_patch patch;
+  unsigned char *held, *taken; /* taken: in or next to an earlier limb */
 } twist_run;
 
-/* A ring of a limb. */
-typedef struct band {
-  double height, from[3], to[3], rotation[9];
-} band;
-
-static int32_t find_part(int32_t *part, int32_t v) {
-  while (part[v] != v) {
-    v = part[v] = part[part[v]];
-  }
-  return v;
-}
-
-/* Joins neighbours whose flags both have this value. */
-static void join_parts(twist_run *run, const unsigned char *flag, int value) {
-  const orb_map_surface *b = run->b;
-  for (int32_t v = 0; v < b->vertex_count; v++) {
-    run->part[v] = v;
-  }
-  for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
-    int32_t v = b->triangles[h], u = b->triangles[orb_next(h)];
-    if (flag[v] == value && flag[u] == value) {
-      int32_t p = find_part(run->part, v), q = find_part(run->part, u);
-      run->part[p > q ? p : q] = p > q ? q : p;
-    }
-  }
-  for (int32_t v = 0; v < b->vertex_count; v++) {
-    run->part[v] = find_part(run->part, v);
-  }
-}
-
-/* The share of the surface in triangles with all corners inside. */
-static double share_inside(const twist_run *run) {
-  const orb_map_surface *b = run->b;
-  double area = 0;
-  for (int32_t t = 0; t < b->triangle_count; t++) {
-    const int32_t *v = b->triangles + 3 * (size_t)t;
-    if (run->inside[v[0]] && run->inside[v[1]] && run->inside[v[2]]) {
-      area += orb_triangle_area_at(b->x, v);
-    }
-  }
-  return area / (4 * M_PI);
-}
-
-/* Parts of the outside that the inside separates from the greatest one become inside. */
-static orb_status fill_holes(twist_run *run) {
-  int32_t n = run->b->vertex_count, most = -1, *count = ORB_NEW0(run->ctx, int32_t, n);
-  if (!count) {
-    return ORB_E_NO_MEMORY;
-  }
-  join_parts(run, run->inside, 0);
-  for (int32_t v = 0; v < n; v++) {
-    if (!run->inside[v]) {
-      count[run->part[v]]++;
-      most = most < 0 || count[run->part[v]] > count[most] ? run->part[v] : most;
-    }
-  }
-  for (int32_t v = 0; v < n; v++) {
-    run->inside[v] = run->inside[v] || run->part[v] != most;
-  }
-  orb_free(run->ctx, count);
-  return ORB_OK;
-}
-
-/* The half-edge out of the same vertex that comes next. */
-static int32_t swing(const orb_map_surface *b, int32_t h) {
-  return b->twin[orb_prev(h)];
-}
-
-/* The vertices inside with a neighbour outside: the first rim. */
-static void find_rim(twist_run *run) {
-  const orb_map_surface *b = run->b;
-  memcpy(run->next, run->inside, (size_t)b->vertex_count);
-  run->rim_count = 0;
-  for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
-    int32_t v = b->triangles[h];
-    if (run->next[v] == 1 && !run->next[b->triangles[orb_next(h)]]) {
-      run->next[v] = 2;
-      run->rim[run->rim_count++] = v;
-    }
-  }
-  memcpy(run->next, run->inside, (size_t)b->vertex_count);
-}
-
-/* Adds the ring of vertices around the rim to run->next, and makes it the new rim. Returns its length. *blocked: the
- * ring contains a held vertex or one of another limb. */
-static double dilate(twist_run *run, int *blocked) {
-  const orb_map_surface *b = run->b;
-  double length = 0;
-  int32_t old = run->rim_count, count = old;
-  *blocked = 0;
-  for (int32_t i = 0; i < old; i++) {
-    int32_t first = run->corner[run->rim[i]], h = first;
-    do {
-      int32_t u = b->triangles[orb_next(h)];
-      if (!run->next[u]) {
-        run->next[u] = 1;
-        run->rim[count++] = u;
-        *blocked |= run->held[u] || run->taken[u];
-      }
-      h = swing(b, h);
-    } while (h != first);
-  }
-  run->rim_count = count - old;
-  memmove(run->rim, run->rim + old, (size_t)run->rim_count * sizeof *run->rim);
-  for (int32_t i = 0; i < run->rim_count; i++) {
-    int32_t first = run->corner[run->rim[i]], h = first;
-    do {
-      int32_t u = b->triangles[orb_next(h)];
-      if (run->next[u] && !run->next[b->triangles[orb_prev(h)]]) {
-        length += sqrt(orb_distance2(b->x + 3 * (size_t)run->rim[i], b->x + 3 * (size_t)u));
-      }
-      h = swing(b, h);
-    } while (h != first);
-  }
-  return length;
-}
-
-/* Grows the part towards its root: until the rings widen, or a held vertex or another limb is in the way. */
-static orb_status grow(twist_run *run) {
-  const orb_map_surface *b = run->b;
+/* Adds rings to the flags inside until they widen, or a held vertex or another limb is in the way. */
+static orb_status add_rings(twist_run *run) {
+  orb_map_patch *patch = &run->patch;
   double narrowest = INFINITY;
-  int rings = (int)(run->params->twist.growth * sqrt(fmax(1, b->vertex_count / GROWTH_VERTICES)));
-  find_rim(run);
-  for (int i = 0; i < rings && run->rim_count > 0; i++) {
+  int rings = (int)(run->params->twist.growth * sqrt(fmax(1, run->b->vertex_count / GROWTH_VERTICES)));
+  orb_map_patch_find_rim(patch);
+  for (int i = 0; i < rings && patch->rim_count > 0; i++) {
     int blocked;
-    double length = dilate(run, &blocked);
+    double length = orb_map_patch_dilate(patch, run->held, run->taken, &blocked);
     narrowest = fmin(narrowest, length);
     if (blocked || length > run->params->twist.wider * narrowest) {
       break;
     }
-    for (int32_t k = 0; k < run->rim_count; k++) {
-      run->inside[run->rim[k]] = 1;
+    for (int32_t k = 0; k < patch->rim_count; k++) {
+      patch->inside[patch->rim[k]] = ORB_MAP_LIMB;
     }
     ORB_TRY(orb_context_check(run->ctx));
   }
-  return fill_holes(run);
+  return ORB_OK;
 }
 
-/* The pole: the only held vertex inside, else the vertex deepest inside. −1: several are held. */
-static int32_t find_pole(twist_run *run) {
-  const orb_map_surface *b = run->b;
-  int32_t pole = -1;
-  for (int32_t v = 0; v < b->vertex_count; v++) {
-    if (run->inside[v] && run->held[v]) {
-      if (pole >= 0) {
-        return -1;
+/* Grows the part towards its root. */
+static orb_status grow(twist_run *run) {
+  ORB_TRY(add_rings(run));
+  return orb_map_patch_fill(&run->patch, ORB_MAP_LIMB);
+}
+
+/* Is what lies beyond the part in one piece? */
+static int end_is_whole(orb_map_patch *patch) {
+  int32_t piece = -1;
+  orb_map_patch_join(patch, patch->inside, ORB_MAP_END);
+  for (int32_t v = 0; v < patch->b->vertex_count; v++) {
+    if (patch->inside[v] == ORB_MAP_END) {
+      if (piece >= 0 && patch->joined[v] != piece) {
+        return 0;
       }
-      pole = v;
+      piece = patch->joined[v];
     }
   }
-  memcpy(run->next, run->inside, (size_t)b->vertex_count);
-  for (int32_t left = 1; left > 0 && !(pole >= 0 && run->held[pole]);) { /* peel it, rim by rim */
+  return piece >= 0;
+}
+
+/* Grows the part towards its end, which stays in one piece. */
+static orb_status grow_into_end(twist_run *run) {
+  orb_map_patch *patch = &run->patch;
+  const int32_t n = run->b->vertex_count;
+  unsigned char *before = ORB_NEW(run->ctx, unsigned char, n);
+  if (!before) {
+    return ORB_E_NO_MEMORY;
+  }
+  memcpy(before, patch->inside, (size_t)n);
+  for (int32_t v = 0; v < n; v++) {
+    patch->inside[v] = before[v] != ORB_MAP_END;
+  }
+  const orb_status status = add_rings(run);
+  for (int32_t v = 0; v < n; v++) {
+    patch->inside[v] = (unsigned char)(!before[v] ? 0 : patch->inside[v] ? ORB_MAP_LIMB : ORB_MAP_END);
+  }
+  if (status == ORB_OK && !end_is_whole(patch)) {
+    memcpy(patch->inside, before, (size_t)n);
+  }
+  orb_free(run->ctx, before);
+  return status;
+}
+
+/* The pole: the held vertex inside, else the vertex deepest inside. */
+static int32_t find_pole(twist_run *run) {
+  const orb_map_surface *b = run->b;
+  unsigned char *next = run->patch.next;
+  int32_t pole = -1;
+  for (int32_t v = 0; v < b->vertex_count; v++) {
+    if (run->patch.inside[v] && run->held[v]) {
+      return v;
+    }
+  }
+  memcpy(next, run->patch.inside, (size_t)b->vertex_count);
+  for (int32_t left = 1; left > 0;) { /* peel it, rim by rim */
     left = 0;
     for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
-      if (run->next[b->triangles[h]] == 1 && !run->next[b->triangles[orb_next(h)]]) {
-        run->next[b->triangles[h]] = 2;
+      if (next[b->triangles[h]] == 1 && !next[b->triangles[orb_next(h)]]) {
+        next[b->triangles[h]] = 2;
       }
     }
     for (int32_t v = 0; v < b->vertex_count; v++) {
-      pole = run->next[v] && !left ? v : pole;
-      left += run->next[v] == 1;
-      run->next[v] = run->next[v] == 1;
+      pole = next[v] && !left ? v : pole;
+      left += next[v] == 1;
+      next[v] = next[v] == 1;
     }
   }
   return pole;
-}
-
-typedef struct ranked {
-  double height;
-  int32_t vertex;
-} ranked;
-
-static int by_height(const void *a, const void *b) {
-  const ranked *x = a, *y = b;
-  return x->height != y->height ? (x->height > y->height) - (x->height < y->height)
-                                : (x->vertex > y->vertex) - (x->vertex < y->vertex);
-}
-
-/* The centres of a band's vertices on both shapes, and the rotation between them. */
-static int fit_band(const twist_run *run, const ranked *list, int32_t count, band *out) {
-  double h[9] = {0};
-  memset(out, 0, sizeof *out);
-  for (int32_t i = 0; i < count; i++) {
-    const double *y = run->b->x + 3 * (size_t)list[i].vertex, *x = run->back + 3 * (size_t)list[i].vertex;
-    out->height += list[i].height / count;
-    for (int k = 0; k < 3; k++) {
-      out->from[k] += x[k] / count;
-      out->to[k] += y[k] / count;
-    }
-  }
-  for (int32_t i = 0; i < count; i++) {
-    double x[3], y[3];
-    orb_sub(run->back + 3 * (size_t)list[i].vertex, out->from, x);
-    orb_sub(run->b->x + 3 * (size_t)list[i].vertex, out->to, y);
-    orb_add_outer(h, y, x, 1);
-  }
-  return orb_nearest_rotation(h, out->rotation);
-}
-
-/* The angle by which one band is rotated against another, around the axis between them. */
-static double rotation_between(const band *low, const band *high) {
-  double axis[3], e[3], f[3], d[9], cosine = 0, sine = 0;
-  const double any[3] = {1, 0, 0}, other[3] = {0, 1, 0};
-  orb_sub(high->to, low->to, axis);
-  if (!(orb_normalize(axis) > 0)) {
-    return 0;
-  }
-  orb_cross(axis, fabs(axis[0]) < NOT_PARALLEL ? any : other, e);
-  orb_normalize(e);
-  orb_cross(axis, e, f);
-  for (int k = 0; k < 9; k++) {
-    d[k] = orb_dot(high->rotation + 3 * (k / 3), low->rotation + 3 * (k % 3));
-  }
-  for (int k = 0; k < 9; k++) {
-    cosine += d[k] * (e[k / 3] * e[k % 3] + f[k / 3] * f[k % 3]);
-    sine += d[k] * (f[k / 3] * e[k % 3] - e[k / 3] * f[k % 3]);
-  }
-  return atan2(sine, cosine);
-}
-
-/* The twist from the rim to each band; none where there are too few vertices. */
-static orb_status measure_twist(twist_run *run, orb_map_twist *out) {
-  const orb_map_surface *b = run->b;
-  int32_t n = 0, rim = 0;
-  int blocked;
-  band low, high;
-  ranked *list = ORB_NEW(run->ctx, ranked, b->vertex_count);
-  if (!list) {
-    return ORB_E_NO_MEMORY;
-  }
-  find_rim(run);
-  (void)dilate(run, &blocked);
-  for (int32_t v = 0; v < b->vertex_count; v++) {
-    if (run->next[v]) {
-      list[n++] = (ranked){run->inside[v] ? run->height[v] : 0, v};
-      rim += !run->inside[v];
-    }
-  }
-  qsort(list, (size_t)n, sizeof *list, by_height);
-  int32_t bands = (n - rim) / run->params->twist.band_vertices, wanted = bands < ORB_MAP_BANDS ? bands : ORB_MAP_BANDS;
-  int fine = wanted >= run->params->twist.bands && fit_band(run, list, rim, &low);
-  out->height[0] = out->angle[0] = 0;
-  for (int32_t k = 0; k < wanted && fine; k++) {
-    int32_t begin = rim + (int32_t)((int64_t)(n - rim) * k / wanted);
-    int32_t end = rim + (int32_t)((int64_t)(n - rim) * (k + 1) / wanted);
-    fine = fit_band(run, list + begin, end - begin, &high);
-    out->height[k + 1] = high.height;
-    out->angle[k + 1] = out->angle[k] + rotation_between(&low, &high);
-    low = high;
-  }
-  out->count = fine ? (int)wanted + 1 : 0;
-  orb_free(run->ctx, list);
-  return ORB_OK;
 }
 
 int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, double share, orb_place *place) {
@@ -305,7 +144,7 @@ int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, 
     return 0;
   }
   const orb_map_twist *t = &twists->limb[limb];
-  if (t->count < 2) {
+  if (t->count < 2 || (t->pole < 0 && share < 1)) {
     return 0;
   }
   int k = 1;
@@ -317,69 +156,129 @@ int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, 
   return orb_map_limb_rotate(b, twists->height, -share * angle, place);
 }
 
+/* Makes the angles of a limb whose end stays whole turns at the end. The limb is not twisted if they are none, or if
+ * bands are too few to count them. */
+static void count_turns(const orb_map_params *params, orb_map_twist *limb) {
+  const double total = limb->count > 0 ? limb->angle[limb->count - 1] : 0, turns = rint(total / (2 * M_PI));
+  int counted = turns != 0;
+  for (int k = 1; k < limb->count; k++) {
+    counted = counted && fabs(limb->angle[k] - limb->angle[k - 1]) < params->twist.step;
+  }
+  for (int k = 1; k < limb->count && counted; k++) {
+    limb->angle[k] *= 2 * M_PI * turns / total;
+  }
+  limb->count = counted ? limb->count : 0;
+}
+
 /* Adds the current limb to the list if it is twisted. Limbs stay apart: its neighbours are closed to other limbs. */
 static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
-  int32_t n = run->b->vertex_count;
+  orb_map_patch *patch = &run->patch;
   orb_map_twist limb = {.pole = pole};
   int blocked;
-  ORB_TRY(orb_map_limb_heights(run->ctx, run->params, run->b, run->inside, pole, run->height));
-  ORB_TRY(measure_twist(run, &limb));
+  ORB_TRY(orb_map_limb_heights(run->ctx, run->params, run->b, patch->inside, run->height));
+  ORB_TRY(orb_map_bands_measure(run->params, patch, run->height, run->back, &limb));
+  if (pole < 0) {
+    count_turns(run->params, &limb);
+  }
   for (int k = 1; k < limb.count; k++) {
     limb.most = fmax(limb.most, fabs(limb.angle[k]));
   }
   if (limb.most < run->params->twist.twisted) {
     return ORB_OK;
   }
-  find_rim(run);
-  (void)dilate(run, &blocked);
-  for (int32_t v = 0; v < n; v++) {
-    if (run->inside[v]) {
+  orb_map_patch_find_rim(patch);
+  (void)orb_map_patch_dilate(patch, run->held, run->taken, &blocked);
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    if (patch->inside[v]) {
       out->of[v] = out->count;
       out->height[v] = run->height[v];
     }
-    run->taken[v] |= run->next[v];
+    run->taken[v] |= patch->next[v];
   }
   out->limb[out->count++] = limb;
   return ORB_OK;
 }
 
-/* Examines the part that vertex `seed` represents. */
-static orb_status examine(twist_run *run, const int32_t *part, int32_t seed, orb_map_twists *out) {
+/* A limb with a free end. */
+static orb_status examine_tip(twist_run *run, orb_map_twists *out) {
+  unsigned char *inside = run->patch.inside;
   for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    run->inside[v] = part[v] == seed;
+    inside[v] = inside[v] ? ORB_MAP_LIMB : 0;
   }
-  ORB_TRY(fill_holes(run));
-  for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    if (run->inside[v] && run->taken[v]) {
-      return ORB_OK;
-    }
-  }
-  double share = share_inside(run);
-  int32_t pole = share < run->params->twist.smallest || share > run->params->twist.largest ? -1 : find_pole(run);
-  if (pole < 0) {
-    return ORB_OK;
-  }
+  const int32_t pole = find_pole(run);
   ORB_TRY(grow(run));
+  inside[pole] = ORB_MAP_END;
   return add_limb(run, pole, out);
 }
 
-/* Examines the rotated parts of the surface, the largest first. */
+/* A limb whose end is held. What lies beyond the part but has no held vertex is of the limb. */
+static orb_status examine_tube(twist_run *run, orb_map_twists *out) {
+  orb_map_patch *patch = &run->patch;
+  const int32_t n = run->b->vertex_count;
+  int32_t end = -1;
+  orb_map_patch_join(patch, patch->inside, ORB_MAP_END);
+  for (int32_t v = 0; v < n; v++) {
+    if (patch->inside[v] == ORB_MAP_END && run->held[v]) {
+      if (end >= 0 && patch->joined[v] != end) {
+        return ORB_OK; /* several ends, such as those of the fingers: it is no tube */
+      }
+      end = patch->joined[v];
+    }
+  }
+  for (int32_t v = 0; v < n; v++) {
+    patch->inside[v] = patch->inside[v] == ORB_MAP_END && patch->joined[v] != end ? ORB_MAP_LIMB : patch->inside[v];
+  }
+  ORB_TRY(grow(run));
+  ORB_TRY(grow_into_end(run));
+  return add_limb(run, -1, out);
+}
+
+/* Examines the piece that vertex `seed` represents. */
+static orb_status examine(twist_run *run, const int32_t *piece, int32_t seed, orb_map_twists *out) {
+  orb_map_patch *patch = &run->patch;
+  int32_t held_within = 0, held_beyond = 0, taken = 0;
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    patch->inside[v] = piece[v] == seed ? ORB_MAP_LIMB : 0;
+  }
+  ORB_TRY(orb_map_patch_fill(patch, ORB_MAP_END));
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    held_within += patch->inside[v] == ORB_MAP_LIMB && run->held[v];
+    held_beyond += patch->inside[v] == ORB_MAP_END && run->held[v];
+    taken += patch->inside[v] && run->taken[v];
+  }
+  const double share = orb_map_patch_share(patch);
+  if (taken > 0 || share < run->params->twist.smallest) {
+    return ORB_OK;
+  }
+  if (run->reference == run->whole && held_within + held_beyond <= 1) {
+    return share <= run->params->twist.largest ? examine_tip(run, out) : ORB_OK;
+  }
+  const int is_tube = held_within == 0 && held_beyond > 0 && share <= run->params->twist.largest_tube;
+  return is_tube ? examine_tube(run, out) : ORB_OK;
+}
+
+static double rotated(const twist_run *run, int32_t v) {
+  return orb_map_rotations_angle(run->rotation + 9 * (size_t)v, run->reference);
+}
+
+/* Examines the pieces of the surface that are rotated against the reference, the largest first. */
 static orb_status examine_all(twist_run *run, orb_map_twists *out) {
+  orb_map_patch *patch = &run->patch;
   int32_t n = run->b->vertex_count;
-  int32_t *count = ORB_NEW0(run->ctx, int32_t, n), *part = ORB_NEW(run->ctx, int32_t, n);
-  orb_status status = count && part ? ORB_OK : ORB_E_NO_MEMORY;
+  int32_t *count = ORB_NEW0(run->ctx, int32_t, n), *piece = ORB_NEW(run->ctx, int32_t, n);
+  orb_status status = count && piece ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     goto done;
   }
   for (int32_t v = 0; v < n; v++) {
-    run->inside[v] = run->rotated[v] > run->params->twist.rotated;
+    patch->inside[v] = rotated(run, v) > run->params->twist.rotated;
   }
-  join_parts(run, run->inside, 1);
-  memcpy(part, run->part, (size_t)n * sizeof *part);
+  orb_map_patch_join(patch, patch->inside, 1);
+  memcpy(piece, patch->joined, (size_t)n * sizeof *piece);
   for (int32_t v = 0; v < n; v++) {
-    count[part[v]] += run->inside[v];
+    count[piece[v]] += patch->inside[v];
   }
-  for (int i = 0; i < ORB_MAP_LIMBS; i++) {
+  for (int i = 0; i < ORB_MAP_LIMBS && out->count < ORB_MAP_LIMBS; i++) {
     int32_t best = 0;
     for (int32_t v = 0; v < n; v++) {
       best = count[v] > count[best] ? v : best;
@@ -388,12 +287,26 @@ static orb_status examine_all(twist_run *run, orb_map_twists *out) {
       break;
     }
     count[best] = 0;
-    ORB_GO(status, examine(run, part, best, out), done);
+    ORB_GO(status, examine(run, piece, best, out), done);
   }
 done:
   orb_free(run->ctx, count);
-  orb_free(run->ctx, part);
+  orb_free(run->ctx, piece);
   return status;
+}
+
+/* Examines what is rotated against the whole, then what is so against posed parts with held vertices. */
+static orb_status examine_from(twist_run *run, const int32_t *held, int32_t held_count, orb_map_twists *out) {
+  run->reference = run->whole;
+  ORB_TRY(examine_all(run, out));
+  for (int32_t i = 0; i < held_count; i++) {
+    const double *at = run->rotation + 9 * (size_t)held[i];
+    if (orb_map_rotations_angle(at, run->whole) > run->params->twist.rotated) {
+      run->reference = at;
+      ORB_TRY(examine_all(run, out));
+    }
+  }
+  return ORB_OK;
 }
 
 void orb_map_twists_free(orb_context *ctx, orb_map_twists *twists) {
@@ -405,42 +318,35 @@ void orb_map_twists_free(orb_context *ctx, orb_map_twists *twists) {
 orb_status orb_map_twists_find(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
                                const orb_map_image *map, const int32_t *held, int32_t held_count, orb_map_twists *out) {
   size_t n = (size_t)b->vertex_count;
-  twist_run run = {.ctx = ctx, .params = params, .b = b, .map = map};
+  twist_run run = {.ctx = ctx, .params = params, .b = b, .patch = {.ctx = ctx}};
   orb_status status = ORB_E_NO_MEMORY;
   memset(out, 0, sizeof *out);
   out->of = ORB_NEW(ctx, int32_t, n);
   out->height = ORB_NEW0(ctx, double, n);
   run.back = ORB_NEW(ctx, double, 3 * n);
+  run.rotation = ORB_NEW(ctx, double, 9 * n);
   run.height = ORB_NEW(ctx, double, n);
-  run.rotated = ORB_NEW(ctx, double, n);
-  run.part = ORB_NEW(ctx, int32_t, n);
-  run.corner = ORB_NEW(ctx, int32_t, 2 * n);
-  run.held = ORB_NEW0(ctx, unsigned char, 4 * n);
-  if (!out->of || !out->height || !run.back || !run.height || !run.rotated || !run.part || !run.corner || !run.held) {
+  run.held = ORB_NEW0(ctx, unsigned char, n);
+  run.taken = ORB_NEW0(ctx, unsigned char, n);
+  if (!out->of || !out->height || !run.back || !run.rotation || !run.height || !run.held || !run.taken) {
     goto done;
   }
-  run.inside = run.held + n;
-  run.next = run.held + 2 * n;
-  run.taken = run.held + 3 * n;
-  run.rim = run.corner + n;
+  ORB_GO(status, orb_map_patch_create(ctx, b, &run.patch), done);
   for (size_t v = 0; v < n; v++) {
     out->of[v] = -1;
-  }
-  for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
-    run.corner[b->triangles[h]] = h;
   }
   for (int32_t i = 0; i < held_count; i++) {
     run.held[held[i]] = 1;
   }
-  ORB_GO(status, orb_map_rotations_measure(ctx, b, map, run.back, run.rotated, &out->kept), done);
-  status = examine_all(&run, out);
+  ORB_GO(status, orb_map_rotations_measure(ctx, b, map, run.back, run.rotation, run.whole, &out->kept), done);
+  status = examine_from(&run, held, held_count, out);
 done:
   orb_free(ctx, run.back);
+  orb_free(ctx, run.rotation);
   orb_free(ctx, run.height);
-  orb_free(ctx, run.rotated);
-  orb_free(ctx, run.part);
-  orb_free(ctx, run.corner);
   orb_free(ctx, run.held);
+  orb_free(ctx, run.taken);
+  orb_map_patch_free(&run.patch);
   if (status != ORB_OK) {
     orb_map_twists_free(ctx, out);
   }

@@ -4,7 +4,9 @@
  * order:
  *
  *   rotations.h  how a map rotates the surroundings of each vertex in space
+ *   patch.h      a part of the fixed shape, and rings of vertices around it
  *   limb.h       rings around a limb, and rotations along them
+ *   bands.h      the rotation of the map from ring to ring
  *   twist.h      finds the twisted limbs, and undoes a twist
  *   untwist.h    applies that to the best map
  */
