@@ -34,6 +34,12 @@ void api_job_write(const api_job_view *job, api_text *out) {
     api_json_null(out);
   }
   api_json_member_number(out, "progress", job->progress);
+  api_json_key(out, "seconds_left");
+  if (job->state == API_JOB_RUNNING && job->seconds_left > 0) {
+    api_text_printf(out, "%lld", (long long)job->seconds_left);
+  } else {
+    api_json_null(out);
+  }
   api_json_key(out, "result");
   if (job->state == API_JOB_SUCCEEDED) {
     static const char *const results[API_JOB_KINDS] = {"embeddings", "supermeshes", "meshes"};

@@ -21,6 +21,7 @@ typedef struct api_job_view {
   api_job_kind kind;
   api_job_state state;
   double progress;
+  int64_t seconds_left; /* of a job that runs; 0 or less: not known yet */
   int attempt;
   int64_t created, started, finished;
 } api_job_view;

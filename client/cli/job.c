@@ -62,6 +62,18 @@ static void prepare_farewell(const cli *c, const char *url) {
   sigaction(SIGINT, &action, NULL);
 }
 
+/* "align, 12 s left": the label has room for the longest stage and 9,999 seconds. */
+static void show_bar(cli *c, const cJSON *job, const char *step) {
+  const double left = cli_number(job, "seconds_left");
+  char label[32];
+  if (left > 0 && left < 1e4) {
+    snprintf(label, sizeof label, "%.10s, %.0f s left", step, left);
+  } else {
+    snprintf(label, sizeof label, "%.24s", step);
+  }
+  cli_bar(c, label, cli_number(job, "progress"));
+}
+
 int cli_wait(cli *c, const cJSON *job, char **result) {
   char *url = cli_text("%s", cli_string(job, "url", ""));
   cli_reply reply = {0};
@@ -71,7 +83,7 @@ int cli_wait(cli *c, const cJSON *job, char **result) {
   while (!ended(cli_string(job, "state", ""))) {
     cli_reply next;
     const char *stage = cli_string(job, "stage", cli_string(job, "state", ""));
-    cli_bar(c, *stage ? stage : cli_string(job, "state", ""), cli_number(job, "progress"));
+    show_bar(c, job, *stage ? stage : cli_string(job, "state", ""));
     if ((rc = poll(c, url, &next)) != CLI_DONE) {
       cli_error(c, "the job continues when the daemon is back. To wait for it: orbmorph job --wait %s", url);
       cli_reply_free(&next);

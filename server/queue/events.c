@@ -1,5 +1,6 @@
 /* Events and progress of jobs, the connections that wait for them, and the timer: it wakes waiters at their deadline
  * and workers when a retry may be due. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -155,6 +156,23 @@ int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
   return after;
 }
 
+/* Shows more progress, which never decreases, and what is left if the rest takes as long for its size as what is done.
+ */
+static void advance(job *j, double shown) {
+  static const double LEAST = 0.05; /* progress from which the time can be told; less would make it jump */
+  enum { LEAST_MS = 1000 };
+  const int64_t now = orb_clock_ms();
+  j->progress = shown > j->progress ? shown : j->progress;
+  if (j->began_ms == 0) {
+    j->began_ms = now;
+    j->began_at = j->progress;
+  }
+  const double made = j->progress - j->began_at, seconds = 1e-3 * (double)(now - j->began_ms);
+  if (made >= LEAST && now - j->began_ms >= LEAST_MS) {
+    j->seconds_left = (int64_t)ceil(seconds * (1 - j->progress) / made);
+  }
+}
+
 /* A job that waits shows the progress of the jobs that it needs as the first share of its own. */
 static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction) {
   for (job *j = q->first; j; j = j->next) {
@@ -167,7 +185,7 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
         double base = (double)(j->dependency_count - j->waits_for);
         double shown = DEPENDENCIES_SHARE * (base + fraction) / (double)j->dependency_count;
         int stage_changed = strcmp(j->stage, stage) != 0;
-        j->progress = shown > j->progress ? shown : j->progress;
+        advance(j, shown);
         copy_text(j->stage, sizeof j->stage, stage);
         if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
           add_event(q, j, "progress", stage_changed);
@@ -219,7 +237,7 @@ static void move_on(queue *q, job *j, int64_t now) {
     return;
   }
   const double expected = 2 + 1e-3 * (double)j->row.cost; /* seconds, by triangles */
-  j->progress += (span->to - j->progress) * seconds / (seconds + expected);
+  advance(j, j->progress + (span->to - j->progress) * seconds / (seconds + expected));
   add_event(q, j, "progress", 0);
   if (j->row.kind == API_JOB_EMBEDDING) {
     show_to_dependents(q, j, j->stage, j->progress);
@@ -254,7 +272,7 @@ void queue_progress(queue *q, job *j, const char *stage, double fraction) {
   const stage_span *span = span_of(j, stage);
   double shown = span ? span->from + fraction * (span->to - span->from) : 0;
   int stage_changed = strncmp(j->stage, stage, sizeof j->stage - 1) != 0;
-  j->progress = shown > j->progress ? shown : j->progress; /* never decreases */
+  advance(j, shown);
   copy_text(j->stage, sizeof j->stage, stage);
   if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
     add_event(q, j, "progress", stage_changed);

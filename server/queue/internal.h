@@ -29,10 +29,13 @@ struct job {
   job_row row;
   char stage[24];
   double progress, embed_ms;
-  int committed; /* its row is in the catalogue */
-  int dead;      /* its row could not be written */
-  int taken;     /* by a worker, or by a thread that ends it */
-  int running;   /* claimed */
+  int64_t began_ms;     /* when this process first learned of its progress, orb_clock_ms(); 0: it has not */
+  double began_at;      /* and how much that was */
+  int64_t seconds_left; /* by both; 0: not known */
+  int committed;        /* its row is in the catalogue */
+  int dead;             /* its row could not be written */
+  int taken;            /* by a worker, or by a thread that ends it */
+  int running;          /* claimed */
   int cancel;
   int adopters;  /* requests that are making it a listed job */
   int waits_for; /* number of unfinished jobs that it needs */

@@ -211,6 +211,7 @@ void job_view(const job *j, api_job_view *view) {
                          .kind = j->row.kind,
                          .state = j->row.state,
                          .progress = j->progress,
+                         .seconds_left = j->seconds_left,
                          .attempt = j->row.attempt,
                          .created = j->row.created,
                          .started = j->row.started,

@@ -16,9 +16,11 @@ static void show_event(job *j, const char *json) {
   cJSON *event = api_json_parse(json, strlen(json), &error);
   const cJSON *stage = cJSON_GetObjectItemCaseSensitive(event, "stage");
   const cJSON *progress = cJSON_GetObjectItemCaseSensitive(event, "progress");
+  const cJSON *left = cJSON_GetObjectItemCaseSensitive(event, "seconds_left");
   if (cJSON_IsNumber(progress)) {
     j->progress = progress->valuedouble;
   }
+  j->seconds_left = cJSON_IsNumber(left) && left->valuedouble < 1e9 ? (int64_t)left->valuedouble : 0;
   copy_text(j->stage, sizeof j->stage, cJSON_IsString(stage) ? stage->valuestring : "");
   cJSON_Delete(event);
 }

@@ -31,6 +31,7 @@ test('a job can be waited for', async (t) => {
   while (done.json.finished === null);
   assert.equal(done.json.state, 'succeeded');
   assert.equal(done.json.progress, 1);
+  assert.equal(done.json.seconds_left, null);
   assert.equal(done.json.problem, null);
   assert.ok(Date.parse(done.json.finished) >= Date.parse(done.json.started));
   assert.equal((await d.get(done.json.result)).status, 200);
@@ -85,9 +86,12 @@ test('progress moves at least once a second while a job runs, and never back', t
   const now = async () => (await d.get(job.url)).json;
   await until(async () => (await now()).stage, 'it has read its mesh and reports a stage');
   const seen = [];
+  let left = null;
   for (const end = Date.now() + 6000 * patience; Date.now() < end; await sleep(50)) {
-    const { progress, stage, state } = await now();
+    const { progress, stage, state, seconds_left } = await now();
     assert.equal(state, 'running');
+    assert.ok(seconds_left === null ? left === null : Number.isInteger(seconds_left) && seconds_left > 0, seconds_left);
+    left = seconds_left;
     assert.ok(stage && progress < 1, `${stage} ${progress}`);
     if (progress !== seen.at(-1)) seen.push(progress);
   }
@@ -96,7 +100,9 @@ test('progress moves at least once a second while a job runs, and never back', t
     seen,
     [...seen].sort((a, b) => a - b),
   );
+  assert.ok(left > 0, 'it estimates the time that is left');
   assert.equal((await d.delete(job.url)).status, 200);
+  assert.equal((await now()).seconds_left, null);
 });
 
 test('a job can be cancelled while it waits and while it runs', async (t) => {

@@ -131,7 +131,7 @@ test('the fast morph takes the cheap way to a common mesh, unless the options na
 
 test('the default job is sent when the fast one has ended, not to compute beside it, also after a reload', async () => {
   const job = { id: '2'.repeat(32), url: `/v1/jobs/${'2'.repeat(32)}`, kind: 'supermesh', state: 'running' };
-  Object.assign(job, { stage: 'align', progress: 0.4, result: null, problem: null, attempt: 1 });
+  Object.assign(job, { stage: 'align', progress: 0.4, seconds_left: 12, result: null, problem: null, attempt: 1 });
   let ended = false;
   const { page, posted, done } = await pageWith((kind, route) =>
     kind === 'fast'

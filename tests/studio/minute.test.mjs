@@ -87,7 +87,7 @@ test('progress names the stage, says what is left, moves each second, and can be
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   // A job that reports once and then is silent for a long time, as in a long stage.
   const job = { id: '1'.repeat(32), url: `/v1/jobs/${'1'.repeat(32)}`, kind: 'supermesh', state: 'running' };
-  Object.assign(job, { stage: 'align', progress: 0.4, result: null, problem: null, attempt: 1 });
+  Object.assign(job, { stage: 'align', progress: 0.4, seconds_left: 12, result: null, problem: null, attempt: 1 });
   let cancelled = false;
   await page.route('**/v1/supermeshes', (route) =>
     route.request().postDataJSON().align?.options?.preset === 'fast'
@@ -107,7 +107,7 @@ test('progress names the stage, says what is left, moves each second, and can be
   const status = page.locator('.progress').getByRole('status');
   await until(async () => /Matching the shapes \(2 of 5\)/.test(await status.innerText()), 'the stage');
   const text = () => page.locator('.progress').innerText();
-  await until(async () => /about \d+ s left/.test(await text()), 'what is left');
+  await until(async () => /about 12 s left/.test(await text()), 'what is left');
   const bar = () => page.locator('.progress [role=progressbar]').getAttribute('aria-valuenow').then(Number);
   const [begin, seen] = [await bar(), new Set()];
   for (let i = 0; i < 4; i++) {

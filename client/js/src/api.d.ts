@@ -620,6 +620,8 @@ export type Job = {
   stage: string | null;
   /** The progress of the whole job. */
   progress: number;
+  /** An estimate of the time that a running job still takes; null before the job has run for a second and made 5 % of progress. */
+  seconds_left: number | null;
   /** The result, once the job has succeeded. */
   result: string | null;
   /** Why the job failed. */

@@ -36,10 +36,9 @@ const TICK = 250; // ms
 const CREEP = 0.12;
 const CREEP_SECONDS = 12;
 
-/** What is known of the job that is waited for, so that the bar moves and the time left is estimated between reports. */
+/** What is known of the job that is waited for, so that the bar moves between reports. */
 interface Pace {
   id: string | null;
-  since: number;
   reported: number;
   at: number;
   shown: number;
@@ -47,25 +46,22 @@ interface Pace {
 
 function paced(pace: Pace, job: Job | null, now: number): Pace {
   const reported = job?.progress ?? 0;
-  const next = job && job.id !== pace.id ? { id: job.id, since: now, reported, at: now, shown: 0 } : { ...pace };
+  const next = job && job.id !== pace.id ? { id: job.id, reported, at: now, shown: 0 } : { ...pace };
   if (reported > next.reported) Object.assign(next, { reported, at: now });
   const creep = CREEP * (1 - Math.exp(-(now - next.at) / 1000 / CREEP_SECONDS));
   next.shown = Math.max(next.shown, Math.min(next.reported + creep, 0.99));
   return next;
 }
 
-/** The time that is left if the rest runs as the part that is done; null as long as that is a guess. */
-function left({ since, shown }: Pace, now: number): string | null {
-  const passed = (now - since) / 1000;
-  if (passed < 1.5 || shown < 0.08) return null;
-  const seconds = Math.max(1, Math.round((passed * (1 - shown)) / shown));
+function left({ seconds_left: seconds }: Job): string {
+  if (seconds === null) return 'estimating what is left';
   return seconds < 90 ? `about ${seconds} s left` : `about ${Math.round(seconds / 60)} min left`;
 }
 
 function Progress({ running }: { running: Running }) {
   const { job, text } = waitedFor(running);
   const [now, setNow] = useState(() => performance.now());
-  const pace = useRef<Pace>({ id: null, since: now, reported: 0, at: now, shown: 0 });
+  const pace = useRef<Pace>({ id: null, reported: 0, at: now, shown: 0 });
   const begun = useRef(now);
   useEffect(() => {
     const timer = setInterval(() => setNow(performance.now()), TICK);
@@ -85,7 +81,7 @@ function Progress({ running }: { running: Running }) {
       <div class="row spread">
         <span class="hint number" data-varies>
           {clock}
-          {job ? `, ${left(pace.current, now) ?? 'estimating what is left'}` : ''}
+          {job ? `, ${left(job)}` : ''}
         </span>
         <Button kind="quiet" onClick={cancelMerge}>
           Cancel
