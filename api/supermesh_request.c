@@ -307,7 +307,7 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
   api_json_close(out, '}');
 }
 
-/* Names of shapes and landmarks are not part of it. */
+/* Names of shapes and landmarks are not part of it, nor is how sure a caller is of a landmark. */
 static void write_alignment(const api_supermesh_request *request, api_text *out) {
   const api_landmark_list *list = &request->landmarks;
   api_json_open(out, '{');
@@ -323,7 +323,6 @@ static void write_alignment(const api_supermesh_request *request, api_text *out)
     api_json_open(out, '{');
     api_json_member_integer(out, "pass", list->items[l].pass);
     api_json_member_number(out, "radius", list->items[l].radius);
-    api_json_member_number(out, "confidence", list->items[l].confidence);
     api_landmark_weight_write(&list->items[l], out);
     api_json_key(out, "at");
     api_json_open(out, '[');

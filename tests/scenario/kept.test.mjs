@@ -87,7 +87,7 @@ for (const [what, align, marks] of [
   });
 }
 
-test('landmarks, their places and the options of alignment and embedding make another alignment; names do not', async (t) => {
+test('landmarks, their places and the options of alignment and embedding make another alignment; names and confidences do not', async (t) => {
   const d = await daemon(t);
   const shapes = await upload(d);
   const marks = landmarks.slice(0, 5);
@@ -98,6 +98,7 @@ test('landmarks, their places and the options of alignment and embedding make an
   assert.ok((await align({ align: fast('rbf') })) > 0);
   assert.ok((await align({ shapes: [...shapes].reverse(), landmarks: 'auto' })) > 0);
   assert.ok((await align({ embedding: { options: { energy_weight: 0.5 } } })) > 0);
+  assert.equal(await align({ landmarks: marks.map((mark) => ({ ...mark, confidence: 0.5 })) }), 0);
   assert.equal(await align({ shapes: shapes.map((s, i) => ({ ...s, name: `other ${i}` })) }), 0);
   assert.equal(await align({ landmarks: marks.map((l, i) => ({ ...l, name: `mark ${i}` })) }), 0);
 });
