@@ -50,9 +50,10 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
   return count;
 }
 
-/* Where the map is bad, by the largest part of each warning. */
+/* Where the map is bad, by the largest part of each warning. What gets thin does so on the straight path only. */
 static int warn_of_places(FILE *out, const char *bullet, const cJSON *supermesh) {
   const cJSON *warning;
+  const int is_rigid = strcmp(cli_string(member(member(supermesh, "request"), "asset"), "path", ""), "rigid") == 0;
   int count = 0;
   cJSON_ArrayForEach(warning, member(supermesh, "warnings")) {
     const char *a = name_of(supermesh, cli_number(warning, "a")), *b = name_of(supermesh, cli_number(warning, "b"));
@@ -60,17 +61,18 @@ static int warn_of_places(FILE *out, const char *bullet, const cJSON *supermesh)
     const cJSON *centre = member(at, "centre");
     int thin = strcmp(cli_string(warning, "kind", ""), "thin") == 0;
     double x[3];
-    if (thin && cli_number(warning, "share") <= THIN_MOST) {
+    if (thin && (is_rigid || cli_number(warning, "share") <= THIN_MOST)) {
       continue;
     }
     for (int k = 0; k < 3; k++) {
       const cJSON *number = cJSON_GetArrayItem(centre, k);
       x[k] = cJSON_IsNumber(number) ? number->valuedouble : NAN;
     }
-    const char *what = thin ? "of the surface gets thin halfway, as if a limb were twisted"
+    const char *what = thin ? "of the surface gets thin halfway, where a limb is twisted or rotated far"
                             : "of the surface is stretched badly (energy above 20)";
-    fprintf(out, "%sFrom %s to %s, %.1f %% %s; look around (%.4g, %.4g, %.4g) of %s, within %.3g.\n", bullet, a, b,
-            100 * cli_number(warning, "share"), what, x[0], x[1], x[2], a, cli_number(at, "radius"));
+    fprintf(out, "%sFrom %s to %s, %.1f %% %s; look around (%.4g, %.4g, %.4g) of %s, within %.3g.%s\n", bullet, a, b,
+            100 * cli_number(warning, "share"), what, x[0], x[1], x[2], a, cli_number(at, "radius"),
+            thin ? " A landmark there helps against a twist, --path rigid against a rotation." : "");
     count++;
   }
   return count;

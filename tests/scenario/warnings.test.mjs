@@ -64,3 +64,52 @@ test('a good map has no warning', async (t) => {
   assert.ok(made.pairs[0].distortion.symmetric_dirichlet.p99 < 20);
   assert.deepEqual(made.warnings, []);
 });
+
+/** A ball with a limb along x that is bent about z, the more the farther out. Angles in radians. */
+const limbed = (bend) =>
+  obj(
+    ball(5, ([x, y, z]) => {
+      const out = 1.6 * Math.exp(-25 * (1 - x));
+      const [c, s] = [Math.cos(bend * out), Math.sin(bend * out)];
+      const [u, v] = [x * (1 + out), y * (1 + 0.2 * out)];
+      return [u * c - v * s, u * s + v * c, z];
+    }),
+  );
+
+test('a limb that is rotated far gets thin on the straight path, and the client names what helps', async (t) => {
+  const d = await daemon(t);
+  const at = await folder(t);
+  const files = ['up.obj', 'down.obj', 'marks.json', 'morph.glb'].map((name) => path.join(at, name));
+  await writeFile(files[0], limbed(0.7));
+  await writeFile(files[1], limbed(-0.7));
+  const sides = [
+    [0, 1, 0],
+    [0, -1, 0],
+    [0, 0, 1],
+    [0, 0, -1],
+    [-1, 0, 0],
+  ];
+  const marks = sides.map((point, i) => ({ name: `side ${i}`, at: [{ point }, { point }] }));
+  await writeFile(
+    files[2],
+    JSON.stringify({ landmarks: [...marks, { name: 'tip', at: [{ vertex: 0 }, { vertex: 0 }] }] }),
+  );
+  const morph = async (way) => {
+    const options = ['--landmarks', files[2], '-o', files[3], '-t', '0.005', '--fit', 'none', '--path', way];
+    const { code, out, err } = await run(['morph', files[0], files[1], ...options], {
+      env: { ORBMORPH_SERVER: d.url },
+    });
+    assert.equal(code, 0, err);
+    return out;
+  };
+  assert.match(await morph('linear'), /of the surface gets thin halfway, .* A landmark there helps .*, --path rigid/);
+  assert.doesNotMatch(await morph('rigid'), /gets thin/);
+  const kinds = (await d.get('/v1/supermeshes')).json.supermeshes.map(
+    async ({ url }) => (await d.get(url)).json.warnings,
+  );
+  for (const warnings of await Promise.all(kinds))
+    assert.deepEqual(
+      warnings.map(({ kind }) => kind),
+      ['thin'],
+    );
+});

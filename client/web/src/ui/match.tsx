@@ -137,7 +137,10 @@ const THIN_MOST = 0.01;
 /** Where the map between two shapes is bad. */
 export function Warnings({ result: { supermesh } }: { result: Result }) {
   const { shapes } = supermesh;
-  const warnings = (supermesh.warnings ?? []).filter(({ kind, share }) => kind !== 'thin' || share > THIN_MOST);
+  const isRigid = supermesh.request?.asset?.path === 'rigid'; // what gets thin does so on the straight path only
+  const warnings = (supermesh.warnings ?? []).filter(
+    ({ kind, share }) => kind !== 'thin' || (!isRigid && share > THIN_MOST),
+  );
   if (!warnings.length) return null;
   const place = ({ shape, centre, radius }: (typeof warnings)[0]['parts'][0]['at'][0]) =>
     `around (${centre.map((x) => Number(x.toPrecision(3))).join(', ')}) of ${shapes[shape].name}, within ${Number(radius.toPrecision(2))}`;
@@ -146,8 +149,12 @@ export function Warnings({ result: { supermesh } }: { result: Result }) {
       {warnings.map(({ kind, a, b, share, parts }) => (
         <li key={`${kind}${a}${b}`}>
           {`From ${shapes[a].name} to ${shapes[b].name}, ${Number((100 * share).toPrecision(2))} % of the surface ${
-            kind === 'thin' ? 'gets thin halfway, as if a limb were twisted' : 'is stretched badly'
-          }: look ${place(parts[0].at[0])}. A landmark there may help.`}
+            kind === 'thin' ? 'gets thin halfway, where a limb is twisted or rotated far' : 'is stretched badly'
+          }: look ${place(parts[0].at[0])}. ${
+            kind === 'thin'
+              ? 'A landmark there helps against a twist, the path “As rigid as possible” against a rotation.'
+              : 'A landmark there may help.'
+          }`}
         </li>
       ))}
     </ul>
