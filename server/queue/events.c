@@ -157,7 +157,7 @@ int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
 }
 
 /* Shows more progress, which never decreases, and what is left if the rest takes as long for its size as what is done.
- */
+ * The size of a file that is fetched is not known. */
 static void advance(job *j, double shown) {
   static const double LEAST = 0.05; /* progress from which the time can be told; less would make it jump */
   enum { LEAST_MS = 1000 };
@@ -168,8 +168,8 @@ static void advance(job *j, double shown) {
     j->began_at = j->progress;
   }
   const double made = j->progress - j->began_at, seconds = 1e-3 * (double)(now - j->began_ms);
-  if (made >= LEAST && now - j->began_ms >= LEAST_MS) {
-    j->seconds_left = (int64_t)ceil(seconds * (1 - j->progress) / made);
+  if (made >= LEAST && now - j->began_ms >= LEAST_MS && !fetches(j)) {
+    j->seconds_left = (int64_t)fmax(1, ceil(seconds * (1 - j->progress) / made));
   }
 }
 

@@ -29,8 +29,8 @@ struct job {
   job_row row;
   char stage[24];
   double progress, embed_ms;
-  int64_t began_ms;     /* when this process first learned of its progress, orb_clock_ms(); 0: it has not */
-  double began_at;      /* and how much that was */
+  int64_t began_ms;     /* when this attempt first reported progress, orb_clock_ms(); 0: it has not */
+  double began_at;      /* how much that was */
   int64_t seconds_left; /* by both; 0: not known */
   int committed;        /* its row is in the catalogue */
   int dead;             /* its row could not be written */

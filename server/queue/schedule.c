@@ -228,6 +228,14 @@ void schedule_leave(queue *q, job *j) {
   wake_workers(q);
 }
 
+/* The job runs from now on. Time that it waited, or that an earlier attempt took, does not count for what is left. */
+static void show_start(job *j, int64_t now) {
+  j->row.state = API_JOB_RUNNING;
+  j->row.started = j->row.started ? j->row.started : now;
+  j->began_ms = 0;
+  j->seconds_left = 0;
+}
+
 store_result queue_claim(queue *q, job *j) {
   int64_t now = unix_ms();
   if (q->shared) { /* queue_take() has claimed it */
@@ -235,8 +243,7 @@ store_result queue_claim(queue *q, job *j) {
       catalogue_job_begin(q->cat, j->row.id, j->row.attempt);
     }
     pthread_mutex_lock(&q->lock);
-    j->row.state = API_JOB_RUNNING;
-    j->row.started = j->row.started ? j->row.started : now;
+    show_start(j, now);
     pthread_mutex_unlock(&q->lock);
     return STORE_OK;
   }
@@ -246,8 +253,7 @@ store_result queue_claim(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
   if (result == STORE_OK) {
     j->row.attempt++;
-    j->row.state = API_JOB_RUNNING;
-    j->row.started = j->row.started ? j->row.started : now;
+    show_start(j, now);
     j->running = 1;
   }
   pthread_mutex_unlock(&q->lock);

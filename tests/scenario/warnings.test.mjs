@@ -104,10 +104,10 @@ test('a limb that is rotated far gets thin on the straight path, and the client 
   };
   assert.match(await morph('linear'), /of the surface gets thin halfway, .* A landmark there helps .*, --path rigid/);
   assert.doesNotMatch(await morph('rigid'), /gets thin/);
-  const kinds = (await d.get('/v1/supermeshes')).json.supermeshes.map(
+  const made = (await d.get('/v1/supermeshes')).json.supermeshes.map(
     async ({ url }) => (await d.get(url)).json.warnings,
   );
-  for (const warnings of await Promise.all(kinds))
+  for (const warnings of await Promise.all(made))
     assert.deepEqual(
       warnings.map(({ kind }) => kind),
       ['thin'],

@@ -127,9 +127,9 @@ static void rotations_follow_the_rings(void **state) {
   double *height = malloc(n * sizeof *height);
   assert_true(inside && height);
   for (size_t v = 0; v < n; v++) {
-    inside[v] = from_axis(c.sphere + 3 * v) < FADED ? ORB_MAP_LIMB : 0;
+    inside[v] = from_axis(c.sphere + 3 * v) < FADED ? ORB_PATCH_LIMB : 0;
   }
-  inside[c.pole] = ORB_MAP_END;
+  inside[c.pole] = ORB_PATCH_END;
   assert_int_equal(orb_map_limb_heights(c.ctx, &params, &c.surface, inside, height), ORB_OK);
   for (int i = 0; i < 200; i++) {
     double far = 0.25 + 0.25 * i / 200, at = 0.7 * i, angle = (i % 9 - 4) * 0.8, p[3], q[3], wanted[3];
@@ -239,6 +239,22 @@ static void windings_between_held_vertices_are_undone(void **state) {
   }
 }
 
+/* A limb with held ends that is only lifted, bent, or twisted by less than a turn is not wound. */
+static void posed_limbs_with_held_ends_stay(void **state) {
+  (void)state;
+  const double degrees[][3] = {
+      {0, 0, 170}, {0, 100, 0}, {0, 80, 170}, {150, 0, 0}, {-150, 0, 170}}; /* twist, bend, lift */
+  for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i++) {
+    creature c = make_lifted(REACH, degrees[i][0] / DEGREES, degrees[i][1] / DEGREES, degrees[i][2] / DEGREES);
+    const int32_t held[3] = {vertex_at(&c, 1.52), c.pole, vertex_at(&c, 0.09)};
+    orb_map_twists t;
+    find(&c, held, 3, &t);
+    assert_int_equal(t.count, 0);
+    orb_map_twists_free(c.ctx, &t);
+    drop(&c);
+  }
+}
+
 /* The whole of it: the map of a wound tube is left for one of nearly no distortion, which no descent would reach. */
 static void a_wound_map_is_unwound(void **state) {
   (void)state;
@@ -298,6 +314,7 @@ int main(void) {
       cmocka_unit_test(rotations_follow_the_rings),
       cmocka_unit_test(twists_are_measured_and_undone),
       cmocka_unit_test(windings_between_held_vertices_are_undone),
+      cmocka_unit_test(posed_limbs_with_held_ends_stay),
       cmocka_unit_test(a_wound_map_is_unwound),
       cmocka_unit_test(what_is_no_twist_stays),
   };

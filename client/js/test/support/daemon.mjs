@@ -27,6 +27,7 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
     state: job.state,
     stage: job.stage,
     progress: job.step / jobSteps,
+    seconds_left: null,
     result: job.state === 'succeeded' ? `/v1/supermeshes/${job.id}` : null,
     problem: job.problem ?? null,
     attempt: 1,

@@ -54,7 +54,7 @@ function paced(pace: Pace, job: Job | null, now: number): Pace {
 }
 
 function left({ seconds_left: seconds }: Job): string {
-  if (seconds === null) return 'estimating what is left';
+  if (seconds == null) return 'estimating what is left';
   return seconds < 90 ? `about ${seconds} s left` : `about ${Math.round(seconds / 60)} min left`;
 }
 

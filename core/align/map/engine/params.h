@@ -381,13 +381,16 @@ typedef struct orb_map_params {
 
   /* Twisted limbs: which parts are examined, and when one counts. */
   struct {
-    double rotated;           /* radians against the rotation of the whole: vertices beyond are examined */
+    double rotated;           /* radians against the rotation of the whole: vertices beyond are examined, and held ones
+                                 among them are references of their own */
+    double alike;             /* radians: two such references that differ by less count as one */
     double twisted;           /* radians between root and tip: limbs beyond are untwisted */
     double smallest, largest; /* limb, as a share of the surface */
-    double largest_tube;      /* with what lies beyond: the end is the smaller side */
+    double largest_tube;      /* of a wound limb, with what lies beyond */
     int32_t band_vertices;    /* least of a ring, */
     int32_t bands;            /* and least rings of a limb: fewer do not show a twist */
     double step;              /* radians between two rings of a wound limb: more may be a rotation the other way */
+    double unclear;           /* radians by which their sum may miss whole turns */
     double growth;            /* most rings that a part grows by, for 10,000 vertices; grows with their square root */
     double wider;             /* a ring this many times the narrowest is the root */
     int solve_steps;          /* most steps of conjugate gradients for the heights */

@@ -68,17 +68,8 @@ static double rotation_between(const band *low, const band *high) {
   return atan2(sine, cosine);
 }
 
-/* Is this vertex of the end next to the limb? A pole is. */
-static void reach_into_end(const orb_map_patch *patch, unsigned char *reached) {
-  const orb_map_surface *b = patch->b;
-  for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
-    int32_t v = b->triangles[h];
-    reached[v] |= patch->inside[v] == ORB_MAP_END && patch->inside[b->triangles[orb_next(h)]] == ORB_MAP_LIMB;
-  }
-}
-
-/* The vertices of the limb, of the ring around it and of the first ring of its end, by height. *rim: those around it.
- */
+/* The vertices of the limb, of the ring around it and of the first ring of its end, by height. *rim: how many are
+ * around it. */
 static orb_status rank(orb_map_patch *patch, const double *height, ranked *list, int32_t *count, int32_t *rim) {
   const int32_t n = patch->b->vertex_count;
   int blocked;
@@ -88,10 +79,10 @@ static orb_status rank(orb_map_patch *patch, const double *height, ranked *list,
   if (status == ORB_OK) {
     orb_map_patch_find_rim(patch);
     (void)orb_map_patch_dilate(patch, none, none, &blocked);
-    reach_into_end(patch, reached);
+    orb_map_patch_reach(patch, reached);
   }
   for (int32_t v = 0; v < n && status == ORB_OK; v++) {
-    if (patch->next[v] && (patch->inside[v] != ORB_MAP_END || reached[v])) {
+    if (patch->next[v] && (patch->inside[v] != ORB_PATCH_END || reached[v])) {
       list[(*count)++] = (ranked){patch->inside[v] ? height[v] : 0, v};
       *rim += !patch->inside[v];
     }

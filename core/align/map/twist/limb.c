@@ -54,7 +54,7 @@ static orb_status system_create(orb_context *ctx, const orb_map_params *params, 
   s->count = 2;
   s->number = ORB_NEW(ctx, int32_t, b->vertex_count);
   for (int32_t v = 0; s->number && v < b->vertex_count; v++) {
-    s->number[v] = inside[v] == ORB_MAP_END ? 1 : inside[v] ? s->count++ : 0;
+    s->number[v] = inside[v] == ORB_PATCH_END ? 1 : inside[v] ? s->count++ : 0;
   }
   for (int32_t h = 0; s->number && h < 3 * b->triangle_count; h++) {
     s->links += h < b->twin[h] && (s->number[b->triangles[h]] > 1 || s->number[b->triangles[orb_next(h)]] > 1);

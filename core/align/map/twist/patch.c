@@ -136,7 +136,7 @@ double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, con
     do {
       int32_t u = b->triangles[orb_next(h)];
       if (!patch->next[u]) {
-        patch->next[u] = ORB_MAP_LIMB;
+        patch->next[u] = ORB_PATCH_LIMB;
         patch->rim[count++] = u;
         *blocked |= held[u] || taken[u];
       }
@@ -146,4 +146,13 @@ double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, con
   patch->rim_count = count - old;
   memmove(patch->rim, patch->rim + old, (size_t)patch->rim_count * sizeof *patch->rim);
   return rim_length(patch);
+}
+
+void orb_map_patch_reach(const orb_map_patch *patch, unsigned char *reached) {
+  const orb_map_surface *b = patch->b;
+  memset(reached, 0, (size_t)b->vertex_count);
+  for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
+    int32_t v = b->triangles[h];
+    reached[v] |= patch->inside[v] == ORB_PATCH_END && patch->inside[b->triangles[orb_next(h)]] == ORB_PATCH_LIMB;
+  }
 }

@@ -5,14 +5,14 @@
 #include "align/map/engine/surface.h"
 
 enum {
-  ORB_MAP_LIMB = 1, /* a vertex of the limb */
-  ORB_MAP_END = 2   /* a vertex of what lies beyond: it keeps its place */
+  ORB_PATCH_LIMB = 1, /* a vertex of the limb */
+  ORB_PATCH_END = 2   /* a vertex of what lies beyond: it keeps its place */
 };
 
 typedef struct orb_map_patch {
   orb_context *ctx;
   const orb_map_surface *b;
-  unsigned char *inside; /* one flag for each vertex of the surface: 0, ORB_MAP_LIMB or ORB_MAP_END */
+  unsigned char *inside; /* one flag for each vertex of the surface: 0, ORB_PATCH_LIMB or ORB_PATCH_END */
   unsigned char *next;   /* the same while the part grows */
   int32_t *joined;       /* a representative of each vertex's piece; union-find */
   int32_t *corner;       /* a half-edge out of each vertex */
@@ -38,5 +38,8 @@ void orb_map_patch_find_rim(orb_map_patch *patch);
 /* Adds the ring of vertices around the rim to patch->next, and makes it the new rim. Returns its length. *blocked: the
  * ring contains a vertex with one of these flags. */
 double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, const unsigned char *taken, int *blocked);
+
+/* Flags the vertices of the end next to the limb, of all vertices of the surface; a pole is one. */
+void orb_map_patch_reach(const orb_map_patch *patch, unsigned char *reached);
 
 #endif

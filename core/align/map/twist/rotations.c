@@ -164,3 +164,15 @@ orb_status orb_map_rotations_measure(orb_context *ctx, const orb_map_surface *b,
   *kept = kept_halfway(&run, whole);
   return measure_rotations(&run);
 }
+
+orb_status orb_map_rotations_kept(orb_context *ctx, const orb_map_surface *b, const orb_map_image *map, double *kept) {
+  double whole[9];
+  rotations_run run = {.ctx = ctx, .b = b, .map = map, .back = ORB_NEW(ctx, double, 3 * (size_t)b->vertex_count)};
+  orb_status status = run.back ? trace_back(&run) : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    whole_rotation(&run, whole);
+    *kept = kept_halfway(&run, whole);
+  }
+  orb_free(ctx, run.back);
+  return status;
+}

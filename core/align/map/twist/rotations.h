@@ -18,6 +18,10 @@ ORB_MUST_CHECK orb_status orb_map_rotations_measure(orb_context *ctx, const orb_
                                                     const orb_map_image *map, double *back, double *rotation,
                                                     double whole[9], double *kept);
 
+/* The same area without the rest: what is kept halfway. O(n). */
+ORB_MUST_CHECK orb_status orb_map_rotations_kept(orb_context *ctx, const orb_map_surface *b, const orb_map_image *map,
+                                                 double *kept);
+
 /* The angle between two rotations, in radians; 0 if one of them is not defined. */
 double orb_map_rotations_angle(const double a[9], const double b[9]);
 

@@ -19,7 +19,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/map/twist/bands.h"
 #include "align/map/twist/limb.h"
 #include "align/map/twist/patch.h"
 #include "base/check.h"
@@ -37,7 +36,9 @@ typedef struct twist_run {
   const double *reference; /* the rotation that parts are compared with: that of the whole, or at a held vertex */
   double *height;          /* in the current limb */
   orb_map_patch patch;
-  unsigned char *held, *taken; /* taken: in or next to an earlier limb */
+  unsigned char *held;
+  unsigned char *taken;   /* in or next to an earlier limb */
+  unsigned char *reached; /* of the end, next to the limb */
 } twist_run;
 
 /* Adds rings to the flags inside until they widen, or a held vertex or another limb is in the way. */
@@ -54,7 +55,7 @@ static orb_status add_rings(twist_run *run) {
       break;
     }
     for (int32_t k = 0; k < patch->rim_count; k++) {
-      patch->inside[patch->rim[k]] = ORB_MAP_LIMB;
+      patch->inside[patch->rim[k]] = ORB_PATCH_LIMB;
     }
     ORB_TRY(orb_context_check(run->ctx));
   }
@@ -64,15 +65,15 @@ static orb_status add_rings(twist_run *run) {
 /* Grows the part towards its root. */
 static orb_status grow(twist_run *run) {
   ORB_TRY(add_rings(run));
-  return orb_map_patch_fill(&run->patch, ORB_MAP_LIMB);
+  return orb_map_patch_fill(&run->patch, ORB_PATCH_LIMB);
 }
 
 /* Is what lies beyond the part in one piece? */
 static int end_is_whole(orb_map_patch *patch) {
   int32_t piece = -1;
-  orb_map_patch_join(patch, patch->inside, ORB_MAP_END);
+  orb_map_patch_join(patch, patch->inside, ORB_PATCH_END);
   for (int32_t v = 0; v < patch->b->vertex_count; v++) {
-    if (patch->inside[v] == ORB_MAP_END) {
+    if (patch->inside[v] == ORB_PATCH_END) {
       if (piece >= 0 && patch->joined[v] != piece) {
         return 0;
       }
@@ -92,11 +93,11 @@ static orb_status grow_into_end(twist_run *run) {
   }
   memcpy(before, patch->inside, (size_t)n);
   for (int32_t v = 0; v < n; v++) {
-    patch->inside[v] = before[v] != ORB_MAP_END;
+    patch->inside[v] = before[v] != ORB_PATCH_END;
   }
   const orb_status status = add_rings(run);
   for (int32_t v = 0; v < n; v++) {
-    patch->inside[v] = (unsigned char)(!before[v] ? 0 : patch->inside[v] ? ORB_MAP_LIMB : ORB_MAP_END);
+    patch->inside[v] = (unsigned char)(!before[v] ? 0 : patch->inside[v] ? ORB_PATCH_LIMB : ORB_PATCH_END);
   }
   if (status == ORB_OK && !end_is_whole(patch)) {
     memcpy(patch->inside, before, (size_t)n);
@@ -156,11 +157,11 @@ int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, 
   return orb_map_limb_rotate(b, twists->height, -share * angle, place);
 }
 
-/* Makes the angles of a limb whose end stays whole turns at the end. The limb is not twisted if they are none, or if
- * bands are too few to count them. */
-static void count_turns(const orb_map_params *params, orb_map_twist *limb) {
+/* Scales the angles of a limb whose end stays to whole turns at the end. The limb counts as not twisted if they are
+ * none, if they are not clear, or if bands are too few to count them. */
+static void settle_turns(const orb_map_params *params, orb_map_twist *limb) {
   const double total = limb->count > 0 ? limb->angle[limb->count - 1] : 0, turns = rint(total / (2 * M_PI));
-  int counted = turns != 0;
+  int counted = turns != 0 && fabs(total - 2 * M_PI * turns) < params->twist.unclear;
   for (int k = 1; k < limb->count; k++) {
     counted = counted && fabs(limb->angle[k] - limb->angle[k - 1]) < params->twist.step;
   }
@@ -170,15 +171,30 @@ static void count_turns(const orb_map_params *params, orb_map_twist *limb) {
   limb->count = counted ? limb->count : 0;
 }
 
-/* Adds the current limb to the list if it is twisted. Limbs stay apart: its neighbours are closed to other limbs. */
+/* Gives the vertices of the current limb their limb and height. Limbs stay apart: its neighbours are closed to other
+ * limbs. What lies beyond its end is not. */
+static void add_places(twist_run *run, orb_map_twists *out) {
+  orb_map_patch *patch = &run->patch;
+  int blocked;
+  orb_map_patch_find_rim(patch);
+  (void)orb_map_patch_dilate(patch, run->held, run->taken, &blocked);
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    if (patch->inside[v] == ORB_PATCH_LIMB || run->reached[v]) {
+      out->of[v] = out->count;
+      out->height[v] = run->height[v];
+    }
+    run->taken[v] |= patch->inside[v] == ORB_PATCH_END ? run->reached[v] : patch->next[v];
+  }
+}
+
+/* Adds the current limb to the list if it is twisted. */
 static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
   orb_map_patch *patch = &run->patch;
   orb_map_twist limb = {.pole = pole};
-  int blocked;
   ORB_TRY(orb_map_limb_heights(run->ctx, run->params, run->b, patch->inside, run->height));
   ORB_TRY(orb_map_bands_measure(run->params, patch, run->height, run->back, &limb));
   if (pole < 0) {
-    count_turns(run->params, &limb);
+    settle_turns(run->params, &limb);
   }
   for (int k = 1; k < limb.count; k++) {
     limb.most = fmax(limb.most, fabs(limb.angle[k]));
@@ -186,15 +202,7 @@ static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
   if (limb.most < run->params->twist.twisted) {
     return ORB_OK;
   }
-  orb_map_patch_find_rim(patch);
-  (void)orb_map_patch_dilate(patch, run->held, run->taken, &blocked);
-  for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    if (patch->inside[v]) {
-      out->of[v] = out->count;
-      out->height[v] = run->height[v];
-    }
-    run->taken[v] |= patch->next[v];
-  }
+  add_places(run, out);
   out->limb[out->count++] = limb;
   return ORB_OK;
 }
@@ -203,12 +211,27 @@ static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
 static orb_status examine_tip(twist_run *run, orb_map_twists *out) {
   unsigned char *inside = run->patch.inside;
   for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    inside[v] = inside[v] ? ORB_MAP_LIMB : 0;
+    inside[v] = inside[v] ? ORB_PATCH_LIMB : 0;
+    if (inside[v] && run->taken[v]) {
+      return ORB_OK;
+    }
   }
   const int32_t pole = find_pole(run);
   ORB_TRY(grow(run));
-  inside[pole] = ORB_MAP_END;
+  inside[pole] = ORB_PATCH_END;
+  orb_map_patch_reach(&run->patch, run->reached);
   return add_limb(run, pole, out);
+}
+
+/* Is a vertex that the limb would move held, or one of another limb? */
+static int is_in_the_way(const twist_run *run) {
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    const int moves = run->patch.inside[v] == ORB_PATCH_LIMB;
+    if ((moves && run->held[v]) || ((moves || run->reached[v]) && run->taken[v])) {
+      return 1;
+    }
+  }
+  return 0;
 }
 
 /* A limb whose end is held. What lies beyond the part but has no held vertex is of the limb. */
@@ -216,9 +239,9 @@ static orb_status examine_tube(twist_run *run, orb_map_twists *out) {
   orb_map_patch *patch = &run->patch;
   const int32_t n = run->b->vertex_count;
   int32_t end = -1;
-  orb_map_patch_join(patch, patch->inside, ORB_MAP_END);
+  orb_map_patch_join(patch, patch->inside, ORB_PATCH_END);
   for (int32_t v = 0; v < n; v++) {
-    if (patch->inside[v] == ORB_MAP_END && run->held[v]) {
+    if (patch->inside[v] == ORB_PATCH_END && run->held[v]) {
       if (end >= 0 && patch->joined[v] != end) {
         return ORB_OK; /* several ends, such as those of the fingers: it is no tube */
       }
@@ -226,31 +249,36 @@ static orb_status examine_tube(twist_run *run, orb_map_twists *out) {
     }
   }
   for (int32_t v = 0; v < n; v++) {
-    patch->inside[v] = patch->inside[v] == ORB_MAP_END && patch->joined[v] != end ? ORB_MAP_LIMB : patch->inside[v];
+    patch->inside[v] = patch->inside[v] == ORB_PATCH_END && patch->joined[v] != end ? ORB_PATCH_LIMB : patch->inside[v];
   }
   ORB_TRY(grow(run));
   ORB_TRY(grow_into_end(run));
-  return add_limb(run, -1, out);
+  orb_map_patch_reach(patch, run->reached);
+  return is_in_the_way(run) ? ORB_OK : add_limb(run, -1, out);
 }
 
 /* Examines the piece that vertex `seed` represents. */
 static orb_status examine(twist_run *run, const int32_t *piece, int32_t seed, orb_map_twists *out) {
   orb_map_patch *patch = &run->patch;
-  int32_t held_within = 0, held_beyond = 0, taken = 0;
+  const int against_whole = run->reference == run->whole;
+  int32_t held_within = 0, held_beyond = 0;
   for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    patch->inside[v] = piece[v] == seed ? ORB_MAP_LIMB : 0;
+    patch->inside[v] = piece[v] == seed ? ORB_PATCH_LIMB : 0;
+    held_within += patch->inside[v] && run->held[v];
   }
-  ORB_TRY(orb_map_patch_fill(patch, ORB_MAP_END));
-  for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    held_within += patch->inside[v] == ORB_MAP_LIMB && run->held[v];
-    held_beyond += patch->inside[v] == ORB_MAP_END && run->held[v];
-    taken += patch->inside[v] && run->taken[v];
-  }
-  const double share = orb_map_patch_share(patch);
-  if (taken > 0 || share < run->params->twist.smallest) {
+  ORB_TRY(orb_context_check(run->ctx));
+  if (held_within > against_whole) { /* a tip may have one */
     return ORB_OK;
   }
-  if (run->reference == run->whole && held_within + held_beyond <= 1) {
+  ORB_TRY(orb_map_patch_fill(patch, ORB_PATCH_END));
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    held_beyond += patch->inside[v] == ORB_PATCH_END && run->held[v];
+  }
+  const double share = orb_map_patch_share(patch);
+  if (share < run->params->twist.smallest) {
+    return ORB_OK;
+  }
+  if (against_whole && held_within + held_beyond <= 1) {
     return share <= run->params->twist.largest ? examine_tip(run, out) : ORB_OK;
   }
   const int is_tube = held_within == 0 && held_beyond > 0 && share <= run->params->twist.largest_tube;
@@ -295,14 +323,26 @@ done:
   return status;
 }
 
+/* Is this rotation near one that pieces have been compared with? */
+static int is_known(const twist_run *run, const double *rotation, const double *const *known, int count) {
+  for (int i = 0; i < count; i++) {
+    if (orb_map_rotations_angle(rotation, known[i]) < run->params->twist.alike) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
 /* Examines what is rotated against the whole, then what is so against posed parts with held vertices. */
 static orb_status examine_from(twist_run *run, const int32_t *held, int32_t held_count, orb_map_twists *out) {
+  const double *known[ORB_MAP_LIMBS];
+  int count = 0;
   run->reference = run->whole;
   ORB_TRY(examine_all(run, out));
-  for (int32_t i = 0; i < held_count; i++) {
+  for (int32_t i = 0; i < held_count && count < ORB_MAP_LIMBS; i++) {
     const double *at = run->rotation + 9 * (size_t)held[i];
-    if (orb_map_rotations_angle(at, run->whole) > run->params->twist.rotated) {
-      run->reference = at;
+    if (orb_map_rotations_angle(at, run->whole) > run->params->twist.rotated && !is_known(run, at, known, count)) {
+      run->reference = known[count++] = at;
       ORB_TRY(examine_all(run, out));
     }
   }
@@ -328,7 +368,9 @@ orb_status orb_map_twists_find(orb_context *ctx, const orb_map_params *params, c
   run.height = ORB_NEW(ctx, double, n);
   run.held = ORB_NEW0(ctx, unsigned char, n);
   run.taken = ORB_NEW0(ctx, unsigned char, n);
-  if (!out->of || !out->height || !run.back || !run.rotation || !run.height || !run.held || !run.taken) {
+  run.reached = ORB_NEW0(ctx, unsigned char, n);
+  if (!out->of || !out->height || !run.back || !run.rotation || !run.height || !run.held || !run.taken ||
+      !run.reached) {
     goto done;
   }
   ORB_GO(status, orb_map_patch_create(ctx, b, &run.patch), done);
@@ -346,6 +388,7 @@ done:
   orb_free(ctx, run.height);
   orb_free(ctx, run.held);
   orb_free(ctx, run.taken);
+  orb_free(ctx, run.reached);
   orb_map_patch_free(&run.patch);
   if (status != ORB_OK) {
     orb_map_twists_free(ctx, out);

@@ -23,8 +23,7 @@ ORB_MUST_CHECK orb_status orb_map_twists_find(orb_context *ctx, const orb_map_pa
 void orb_map_twists_free(orb_context *ctx, orb_map_twists *twists);
 
 /* Rotates a place on a limb back by a share of its limb's twist there. 0: the place is on no limb and stays, as it does
- * on a wound limb with any share but 1.
- * O(triangles around the limb). */
+ * on a wound limb with any share but 1. O(triangles around the limb). */
 int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, double share, orb_place *place);
 
 #endif

@@ -5,7 +5,8 @@
  * limb. Untangling clears these flips roughly, and descent, with flips allowed now and then against the barrier
  * (orb_map_loosen), lowers the energy from there. Where triangles are large compared with the limb, flips remain; then
  * the limbs are rotated in smaller steps, each untangled and smoothed before the next, and if that folds too, one limb
- * after the other, so that one that folds does not stop the others. Steps without any flip were tried: half of the
+ * after the other, so that one that folds does not stop the others. A limb that is wound by whole turns between two
+ * landmarks has no smaller steps. Steps without any flip were tried: half of the
  * vertices get stuck on the way, and the twist stays.
  *
  * The result is kept if its energy is lower and if more of the area is left halfway through a linear morph. The energy
@@ -51,22 +52,27 @@ static orb_status untangle(orb_map_run *c, orb_map_level *l, int32_t *flips) {
   return *flips == 0 ? orb_map_level_locate_all(c->ctx, l, &c->b, 0) : ORB_OK;
 }
 
-static orb_status find_twists(orb_map_run *c, const double *points, orb_map_twists *out) {
+static orb_map_image image_of(const orb_map_run *c, const double *points) {
   const orb_mesh *mesh = &c->moving->mesh;
-  orb_map_image map = {c->vertex_count, mesh->triangle_count, mesh->triangles, c->x, points};
+  return (orb_map_image){c->vertex_count, mesh->triangle_count, mesh->triangles, c->x, points};
+}
+
+static orb_status find_twists(orb_map_run *c, const double *points, orb_map_twists *out) {
+  const orb_map_image map = image_of(c, points);
   return orb_map_twists_find(c->ctx, &c->params, &c->b, &map, c->pairs.fixed, c->pairs.count, out);
 }
 
 /* Does the level keep clearly more of the area halfway than the best map? points: receives the level's, in mesh order.
  */
 static orb_status keeps_more(const untwisting *u, const orb_corner_table *s, double *points, int *more) {
-  orb_map_twists left;
+  const orb_map_run *c = u->c;
+  double kept;
   for (int32_t v = 0; v < u->l->count; v++) {
     memcpy(points + 3 * (size_t)s->to_mesh[u->l->vertex[v]], u->l->x + 3 * (size_t)v, sizeof(double[3]));
   }
-  ORB_TRY(find_twists(u->c, points, &left));
-  *more = left.kept > u->twists->kept + u->c->params.untwist.kept_gain;
-  orb_map_twists_free(u->c->ctx, &left);
+  const orb_map_image map = image_of(c, points);
+  ORB_TRY(orb_map_rotations_kept(c->ctx, &c->b, &map, &kept));
+  *more = kept > u->twists->kept + c->params.untwist.kept_gain;
   return ORB_OK;
 }
 
@@ -158,6 +164,15 @@ done:
   return status;
 }
 
+/* Steps in which the limbs can be untwisted: there is nothing between a wound limb and an unwound one. */
+static int most_steps(const orb_map_params *params, const orb_map_twists *twists) {
+  int most = params->untwist.steps;
+  for (int32_t k = 0; k < twists->count; k++) {
+    most = twists->limb[k].pole < 0 ? 1 : most;
+  }
+  return most;
+}
+
 static orb_status untwist_limbs(orb_map_run *c, const orb_map_twists *twists) {
   orb_corner_table s = {0};
   orb_map_level level = {0};
@@ -165,9 +180,10 @@ static orb_status untwist_limbs(orb_map_run *c, const orb_map_twists *twists) {
   int32_t flips = 1;
   orb_status status;
   ORB_GO(status, orb_corner_table_create(c->ctx, &c->moving->mesh, &s), done);
-  const int most = c->params.untwist.steps;
-  for (int steps = 1; steps <= most && flips; steps *= most) {
-    ORB_GO(status, untwist_all(&u, &s, steps, &flips), done);
+  const int most = most_steps(&c->params, twists);
+  ORB_GO(status, untwist_all(&u, &s, 1, &flips), done);
+  if (flips && most > 1) {
+    ORB_GO(status, untwist_all(&u, &s, most, &flips), done);
   }
   if (flips && twists->count > 1) {
     ORB_GO(status, untwist_each(&u, &s, &flips), done);
