@@ -384,6 +384,16 @@ static orb_status align_pair(orb_context *ctx, const orb_align_shape shapes[2], 
   return status;
 }
 
+/* For progress. Large later shapes are aligned as copies. */
+static double expected_steps(const orb_align_shape *shapes, int32_t shape_count, const orb_align_options *options) {
+  const double most = orb_map_params_of(options->preset).copies.large;
+  double steps = 0;
+  for (int32_t s = 1; s < shape_count; s++) {
+    steps += ORB_FIND_STEPS_PAIR + ORB_FIND_STEPS_VERTEX * fmin(shapes[s].mesh->vertex_count, most);
+  }
+  return steps;
+}
+
 orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                      const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                      orb_alignment *out) {
@@ -391,6 +401,7 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
   ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
   const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
+  orb_progress_expect(ctx, expected_steps(shapes, shape_count, options));
   const int is_pair = shape_count == 2 && (options->method == ORB_ALIGN_AUTO || options->method == ORB_ALIGN_PIN);
   double energy = INFINITY;
   orb_status status = is_pair
@@ -404,6 +415,7 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   } else {
     orb_progress(ctx, "align", 1);
   }
+  orb_progress_expect(ctx, 0);
   (void)orb_progress_only(ctx, before);
   return status;
 }

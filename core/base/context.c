@@ -1,6 +1,7 @@
 /* The context: creation, cancel flag, deadline, progress, the processor. */
 #include "base/context.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -114,6 +115,31 @@ void orb_progress(orb_context *part, const char *stage, double fraction) {
   }
   if (!ctx->stage || strcmp(ctx->stage, stage) == 0) {
     ctx->options.progress(ctx->options.progress_user, stage, fraction < 0 ? 0 : fraction > 1 ? 1 : fraction);
+  }
+  pthread_mutex_unlock(&ctx->progress_lock);
+}
+
+void orb_progress_expect(orb_context *part, double steps) {
+  orb_context *ctx = part->root;
+  pthread_mutex_lock(&ctx->progress_lock);
+  atomic_store(&ctx->steps, 0);
+  ctx->steps_expected = steps;
+  ctx->steps_shown = 0;
+  pthread_mutex_unlock(&ctx->progress_lock);
+}
+
+void orb_progress_steps(orb_context *part, int64_t steps) {
+  static const double STEADY = 0.8, LEAST = 1e-3; /* fractions; LEAST: what is worth a report */
+  orb_context *ctx = part->root;
+  const double made = (double)(atomic_fetch_add_explicit(&ctx->steps, steps, memory_order_relaxed) + steps);
+  if (!ctx->options.progress || pthread_mutex_trylock(&ctx->progress_lock) != 0) {
+    return;
+  }
+  const double share = ctx->steps_expected > 0 ? made / ctx->steps_expected : 0, rest = 1 - STEADY;
+  const double fraction = share < STEADY ? share : 1 - rest * exp((STEADY - share) / rest);
+  if (ctx->stage && fraction >= ctx->steps_shown + LEAST) {
+    ctx->steps_shown = fraction;
+    ctx->options.progress(ctx->options.progress_user, ctx->stage, fraction);
   }
   pthread_mutex_unlock(&ctx->progress_lock);
 }

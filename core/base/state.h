@@ -19,6 +19,9 @@ struct orb_context {
   int in_loop; /* set by orb_parallel_for() around a loop: the first failure wins */
   pthread_mutex_t progress_lock;
   const char *stage;     /* the only stage that is reported; NULL: any */
+  double steps_expected; /* of that stage; 0: its steps are not counted */
+  atomic_llong steps;    /* made so far */
+  double steps_shown;    /* as the fraction that was last reported */
   struct orb_pool *pool; /* created by the first parallel loop, or by orb_pool_open() */
   uint64_t hash_key[2];  /* of orb_hash() */
 };

@@ -8,7 +8,8 @@
 #include "elastic/rough_map.h"
 
 /* Chosen by trial on the pairs of the half `choose` of tests/bench/correspond.py. */
-enum { ALTERNATIONS = 2 }; /* of rotations and positions in a round */
+enum { ALTERNATIONS = 2 };    /* of rotations and positions in a round */
+enum { STEPS_OF_VERTEX = 8 }; /* for progress: a round takes as long as so many steps of a composed map's sweeps */
 /* The rough map keeps pulling beside the places, with this share of its strength at first, and not at all after FADED
  * of the rounds: without it a limb slides to the nearest other one. */
 static const double MAP_SHARE = 0.3, FADED = 0.7;
@@ -29,6 +30,7 @@ orb_status orb_registration_round(orb_registration *r, double done, double reach
     ORB_TRY(orb_registration_solve(r, k == 0));
     orb_registration_fit(r);
   }
+  orb_progress_steps(r->ctx, STEPS_OF_VERTEX * (int64_t)r->a.count);
   return ORB_OK;
 }
 

@@ -106,10 +106,18 @@ void keep_event(job *j, int64_t number, const char *type, const char *json) {
   event->type[sizeof event->type - 1] = 0;
 }
 
+/* Until it reports again, what is left becomes less; but who has been silent for long will probably be so for longer.
+ */
+static void show_left(job *j) {
+  const int64_t now = orb_clock_ms(), left = j->ends_ms - now, silent = (now - j->reported_ms) / 2;
+  j->seconds_left = j->ends_ms == 0 ? 0 : ((left > silent ? left : silent) + 999) / 1000;
+}
+
 /* Adds an event with the job's current state; `store` also writes it to the catalogue. Not for the final event, which
  * catalogue_job_finish() writes. */
 static void add_event(queue *q, job *j, const char *type, int store) {
   api_text json = {0};
+  show_left(j);
   int64_t number = prepare_event(j, &json);
   if (!json.failed) {
     keep_event(j, number, type, json.data);
@@ -156,9 +164,10 @@ int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
   return after;
 }
 
-/* Shows more progress, which never decreases, and what is left if the rest takes as long for its size as what is done.
- * The size of a file that is fetched is not known. */
-static void advance(job *j, double shown) {
+/* Shows more progress, which never decreases, and estimates the end of the job: the rest takes as long for its size as
+ * what is done. The size of a file that is fetched is not known. is_guess: the job has not reported it, so an estimate
+ * that there is stays. */
+static void advance(job *j, double shown, int is_guess) {
   static const double LEAST = 0.05; /* progress from which the time can be told; less would make it jump */
   enum { LEAST_MS = 1000 };
   const int64_t now = orb_clock_ms();
@@ -167,14 +176,18 @@ static void advance(job *j, double shown) {
     j->began_ms = now;
     j->began_at = j->progress;
   }
-  const double made = j->progress - j->began_at, seconds = 1e-3 * (double)(now - j->began_ms);
-  if (made >= LEAST && now - j->began_ms >= LEAST_MS && !fetches(j)) {
-    j->seconds_left = (int64_t)fmax(1, ceil(seconds * (1 - j->progress) / made));
+  const double made = j->progress - j->began_at, ms = (double)(now - j->began_ms);
+  if (is_guess && j->ends_ms > 0) {
+    return;
+  }
+  j->reported_ms = now;
+  if (made >= LEAST && ms >= LEAST_MS && !fetches(j)) {
+    j->ends_ms = now + (int64_t)(ms * (1 - j->progress) / made);
   }
 }
 
 /* A job that waits shows the progress of the jobs that it needs as the first share of its own. */
-static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction) {
+static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction, int is_guess) {
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
       if (is_for(of, j->dependencies[d], j->row.owner)) {
@@ -185,7 +198,7 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
         double base = (double)(j->dependency_count - j->waits_for);
         double shown = DEPENDENCIES_SHARE * (base + fraction) / (double)j->dependency_count;
         int stage_changed = strcmp(j->stage, stage) != 0;
-        advance(j, shown);
+        advance(j, shown, is_guess);
         copy_text(j->stage, sizeof j->stage, stage);
         if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
           add_event(q, j, "progress", stage_changed);
@@ -237,10 +250,10 @@ static void move_on(queue *q, job *j, int64_t now) {
     return;
   }
   const double expected = 2 + 1e-3 * (double)j->row.cost; /* seconds, by triangles */
-  advance(j, j->progress + (span->to - j->progress) * seconds / (seconds + expected));
+  advance(j, j->progress + (span->to - j->progress) * seconds / (seconds + expected), 1);
   add_event(q, j, "progress", 0);
   if (j->row.kind == API_JOB_EMBEDDING) {
-    show_to_dependents(q, j, j->stage, j->progress);
+    show_to_dependents(q, j, j->stage, j->progress, 1);
   }
 }
 
@@ -272,12 +285,12 @@ void queue_progress(queue *q, job *j, const char *stage, double fraction) {
   const stage_span *span = span_of(j, stage);
   double shown = span ? span->from + fraction * (span->to - span->from) : 0;
   int stage_changed = strncmp(j->stage, stage, sizeof j->stage - 1) != 0;
-  advance(j, shown);
+  advance(j, shown, 0);
   copy_text(j->stage, sizeof j->stage, stage);
   if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
     add_event(q, j, "progress", stage_changed);
     if (j->row.kind == API_JOB_EMBEDDING) {
-      show_to_dependents(q, j, j->stage, j->progress);
+      show_to_dependents(q, j, j->stage, j->progress, 0);
     }
   }
   pthread_mutex_unlock(&q->lock);

@@ -232,8 +232,7 @@ void schedule_leave(queue *q, job *j) {
 static void show_start(job *j, int64_t now) {
   j->row.state = API_JOB_RUNNING;
   j->row.started = j->row.started ? j->row.started : now;
-  j->began_ms = 0;
-  j->seconds_left = 0;
+  j->began_ms = j->ends_ms = j->seconds_left = 0;
 }
 
 store_result queue_claim(queue *q, job *j) {

@@ -1,5 +1,6 @@
 /* Tasks that run side by side: each once, on a part of the context that shares its budget, cancel flag and progress,
  * and has an error of its own. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdatomic.h>
@@ -299,11 +300,62 @@ static void no_memory_is_told(void **unused) {
   assert_true(has_failed > 0 && has_worked);
 }
 
+typedef struct reports {
+  int count;
+  double last;
+} reports;
+
+static void note_report(void *user, const char *stage, double fraction) {
+  reports *r = user;
+  assert_string_equal(stage, "align");
+  assert_true(fraction > r->last && fraction <= 1);
+  r->last = fraction;
+  r->count++;
+}
+
+/* Steps of tasks show as a share of what is expected, and of more of them something is always left. */
+static orb_status make_steps(orb_context *ctx, void *arg, int32_t i) {
+  (void)arg;
+  (void)i;
+  orb_progress_steps(ctx, 100);
+  return ORB_OK;
+}
+
+static void steps_are_reported_as_a_share(void **state) {
+  (void)state;
+  reports r = {.last = 0};
+  orb_context *ctx;
+  const orb_context_options options = {.threads = 2, .progress = note_report, .progress_user = &r};
+  assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+  orb_progress_steps(ctx, 1); /* not expected: nothing is reported */
+  assert_int_equal(r.count, 0);
+  (void)orb_progress_only(ctx, "align");
+  orb_progress_expect(ctx, 1000);
+  assert_int_equal(orb_tasks_run(ctx, 5, make_steps, NULL), ORB_OK);
+  orb_progress_steps(ctx, 100); /* a task that met another one may have reported nothing */
+  assert_true(fabs(r.last - 0.6) < 1e-12);
+  for (int i = 0; i < 9000; i++) {
+    orb_progress_steps(ctx, 1);
+    assert_true(i > 50 || fabs(r.last - 0.6 - 1e-3 * (i + 1)) < 1e-3 + 1e-12);
+    assert_true(i > 1000 || r.last < 0.999);
+  }
+  const int count = r.count;
+  assert_true(count > 300 && count < 407 && r.last > 0.99); /* each tells a thousandth at least */
+  orb_progress_expect(ctx, 0);
+  orb_progress_steps(ctx, 1000);
+  assert_int_equal(r.count, count);
+  orb_context_destroy(ctx);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(each_task_once),           cmocka_unit_test(first_failure_is_told),
-      cmocka_unit_test(budget_is_shared),         cmocka_unit_test(cancelling_reaches_all),
-      cmocka_unit_test(progress_is_the_callers),  cmocka_unit_test(idle_threads_help),
-      cmocka_unit_test(helpers_take_inner_tasks), cmocka_unit_test(no_memory_is_told)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(steps_are_reported_as_a_share),
+                                     cmocka_unit_test(each_task_once),
+                                     cmocka_unit_test(first_failure_is_told),
+                                     cmocka_unit_test(budget_is_shared),
+                                     cmocka_unit_test(cancelling_reaches_all),
+                                     cmocka_unit_test(progress_is_the_callers),
+                                     cmocka_unit_test(idle_threads_help),
+                                     cmocka_unit_test(helpers_take_inner_tasks),
+                                     cmocka_unit_test(no_memory_is_told)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -128,7 +128,6 @@ orb_status orb_map_level_next(orb_map_run *c, orb_refiner *r, orb_map_level *l, 
       orb_map_level_step(l, &c->b, &hard, v);
     }
   }
-  orb_progress(c->ctx, "align", (double)r->live / c->vertex_count);
   return ORB_OK;
 }
 

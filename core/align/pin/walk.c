@@ -29,6 +29,7 @@ enum {
   FINEST_WALK = 4000, /* none beyond this number of vertices */
   SETTLE = 60         /* most sweeps after all have arrived */
 };
+enum { STEPS_OF_VERTEX = 20 };          /* for progress: a stage takes as long as so many steps of a map (align.c) */
 static const double LEAST_SHARE = 0.6;  /* that a determinant keeps in one step */
 static const double SHORTER = 0.6;      /* a try's length relative to the one before it */
 static const double NO_PROGRESS = 1e-4; /* chords of all landmarks in one step: less ends the level */
@@ -383,18 +384,18 @@ static orb_status finish_one(orb_context *ctx, void *arg, int32_t s) {
 }
 
 /* Runs a stage for all shapes. Tasks have contexts of their own, which end with them. */
-static orb_status run_stage(orb_context *ctx, company *all, orb_task_fn stage, double done) {
+static orb_status run_stage(orb_context *ctx, company *all, orb_task_fn stage) {
   orb_status status = orb_tasks_run(ctx, all->shape_count, stage, all);
   for (int32_t s = 0; s < all->shape_count; s++) {
     all->walkers[s].ctx = all->walkers[s].ctx ? ctx : NULL;
+    orb_progress_steps(ctx, STEPS_OF_VERTEX * (int64_t)all->sheets[s].vertex_capacity);
   }
-  orb_progress(ctx, "align", done);
   return status;
 }
 
 /* *stuck stays 1 if the landmarks cannot meet. */
 static orb_status walk_together(orb_context *ctx, company *all, int *stuck) {
-  ORB_TRY(run_stage(ctx, all, create_one, 0.3));
+  ORB_TRY(run_stage(ctx, all, create_one));
   for (int32_t s = 0; s < all->shape_count; s++) {
     if (!all_live(&all->walkers[s])) {
       return ORB_OK;
@@ -404,13 +405,13 @@ static orb_status walk_together(orb_context *ctx, company *all, int *stuck) {
   if (!targets_apart(all->targets, all->count)) {
     return ORB_OK;
   }
-  ORB_TRY(run_stage(ctx, all, walk_one, 0.5));
+  ORB_TRY(run_stage(ctx, all, walk_one));
   for (int32_t s = 0; s < all->shape_count; s++) {
     if (all->left[s] > 0) {
       return ORB_OK;
     }
   }
-  ORB_TRY(run_stage(ctx, all, finish_one, 1));
+  ORB_TRY(run_stage(ctx, all, finish_one));
   for (int32_t s = 0; s < all->shape_count; s++) {
     if (!all->good[s]) {
       return ORB_OK;

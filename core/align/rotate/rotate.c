@@ -92,7 +92,6 @@ orb_status orb_rotate_by_search(orb_context *ctx, orb_sheet *sheets, int32_t sha
     double rotation[9];
     ORB_TRY(orb_rotation_search(ctx, &sheets[0].shape, &sheets[s].shape, rotation, NULL));
     ORB_TRY(rotate_sheet(ctx, &sheets[s], rotation));
-    orb_progress(ctx, "align", (double)s / shape_count);
   }
   return ORB_OK;
 }

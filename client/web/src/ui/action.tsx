@@ -17,6 +17,7 @@ const STAGES: Record<string, [string, number]> = {
   remesh: ['Building the common mesh', 3],
   transfer: ['Placing the shapes', 4],
   write: ['Writing the asset', 5],
+  store: ['Writing the asset', 5],
 };
 const STEPS = 5;
 

@@ -212,6 +212,7 @@ orb_status orb_map_level_sweeps(orb_context *ctx, orb_map_level *l, const orb_ma
   for (int i = 0; i < count && stepped > enough && status == ORB_OK; i++) {
     status = sweep_once(ctx, &s, &stepped);
     *work -= stepped;
+    orb_progress_steps(ctx, stepped);
   }
   for (int32_t v = 0; v < l->count; v++) {
     take_vertex(&s.job, v);
