@@ -384,12 +384,19 @@ static orb_status align_pair(orb_context *ctx, const orb_align_shape shapes[2], 
   return status;
 }
 
-/* For progress. Large later shapes are aligned as copies. */
+/* For progress. Of two shapes either may move. Copies of large ones are aligned, which they then follow. */
 static double expected_steps(const orb_align_shape *shapes, int32_t shape_count, const orb_align_options *options) {
-  const double most = orb_map_params_of(options->preset).copies.large;
+  const int composes =
+      options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
+  const double large = orb_map_params_of(options->preset).copies.large;
   double steps = 0;
-  for (int32_t s = 1; s < shape_count; s++) {
-    steps += ORB_FIND_STEPS_PAIR + ORB_FIND_STEPS_VERTEX * fmin(shapes[s].mesh->vertex_count, most);
+  for (int32_t s = 0; s < shape_count; s++) {
+    const double n = shapes[s].mesh->vertex_count;
+    const double map =
+        ORB_FIND_STEPS_MAP + ORB_FIND_STEPS_VERTEX * fmin(n, large) + (n > large ? ORB_FIND_STEPS_LIFTED * n : 0);
+    steps = !composes          ? steps + ORB_FIND_STEPS_PLACED * n
+            : shape_count == 2 ? fmax(steps, map)
+                               : steps + (s > 0 ? map : 0);
   }
   return steps;
 }

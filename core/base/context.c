@@ -29,6 +29,8 @@ static void begin(orb_context *ctx, orb_context *root, const orb_context_options
   memset(ctx, 0, offsetof(orb_context, error)); /* what follows is set below: the error takes 1.5 MB */
   ctx->in_loop = 0;
   ctx->stage = NULL;
+  ctx->steps_expected = ctx->steps_shown = 0;
+  atomic_init(&ctx->steps, 0);
   ctx->pool = NULL;
   ctx->magic = CONTEXT_MAGIC;
   ctx->root = root;

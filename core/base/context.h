@@ -20,8 +20,8 @@ ORB_MUST_CHECK orb_status orb_context_part(orb_context *ctx, orb_context **out);
 void orb_progress(orb_context *ctx, const char *stage, double fraction);
 
 /* For a stage whose steps are of many kinds and not known beforehand: from now on orb_progress_steps() reports the
- * stage of orb_progress_only(), which must be set, by the steps that are made out of so many. 0 ends that. Not within a
- * parallel loop. */
+ * stage of orb_progress_only(), which must be set, by the steps that are made out of so many. 0 ends that; such stages
+ * do not nest. Not within a parallel loop. */
 void orb_progress_expect(orb_context *ctx, double steps);
 /* Counts steps, and reports every thousandth of the stage. Any thread; a few thousand times a second. The fraction
  * grows with the steps up to 0.8 and then ever more slowly, so it does not get beyond 1 however many there are. */

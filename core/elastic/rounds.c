@@ -9,7 +9,7 @@
 
 /* Chosen by trial on the pairs of the half `choose` of tests/bench/correspond.py. */
 enum { ALTERNATIONS = 2 };    /* of rotations and positions in a round */
-enum { STEPS_OF_VERTEX = 8 }; /* for progress: a round takes as long as so many steps of a composed map's sweeps */
+enum { STEPS_OF_VERTEX = 8 }; /* for progress: for each vertex, a round takes as long as so many steps of a map */
 /* The rough map keeps pulling beside the places, with this share of its strength at first, and not at all after FADED
  * of the rounds: without it a limb slides to the nearest other one. */
 static const double MAP_SHARE = 0.3, FADED = 0.7;

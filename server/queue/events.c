@@ -106,11 +106,12 @@ void keep_event(job *j, int64_t number, const char *type, const char *json) {
   event->type[sizeof event->type - 1] = 0;
 }
 
-/* Until it reports again, what is left becomes less; but who has been silent for long will probably be so for longer.
- */
+/* Until it reports again, what is left becomes less. A job that has been silent for long is likely to stay silent for
+ * half as long again. */
 static void show_left(job *j) {
   const int64_t now = orb_clock_ms(), left = j->ends_ms - now, silent = (now - j->reported_ms) / 2;
-  j->seconds_left = j->ends_ms == 0 ? 0 : ((left > silent ? left : silent) + 999) / 1000;
+  const int64_t most = left > silent ? left : silent;
+  j->seconds_left = j->ends_ms == 0 ? 0 : most < 1000 ? 1 : (most + 999) / 1000;
 }
 
 /* Adds an event with the job's current state; `store` also writes it to the catalogue. Not for the final event, which
@@ -164,25 +165,27 @@ int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
   return after;
 }
 
-/* Shows more progress, which never decreases, and estimates the end of the job: the rest takes as long for its size as
- * what is done. The size of a file that is fetched is not known. is_guess: the job has not reported it, so an estimate
- * that there is stays. */
-static void advance(job *j, double shown, int is_guess) {
+/* Shows more progress, which never decreases. */
+static void advance(job *j, double shown) {
+  j->progress = shown > j->progress ? shown : j->progress;
+}
+
+/* Shows progress that the job has made, and estimates its end: the rest takes as long for its size as what this attempt
+ * has made. The size of a file that is fetched is not known. */
+static void report(job *j, double made) {
   static const double LEAST = 0.05; /* progress from which the time can be told; less would make it jump */
   enum { LEAST_MS = 1000 };
   const int64_t now = orb_clock_ms();
-  j->progress = shown > j->progress ? shown : j->progress;
+  advance(j, made);
   if (j->began_ms == 0) {
     j->began_ms = now;
-    j->began_at = j->progress;
+    j->began_at = j->reported = made;
   }
-  const double made = j->progress - j->began_at, ms = (double)(now - j->began_ms);
-  if (is_guess && j->ends_ms > 0) {
-    return;
-  }
+  j->reported = made > j->reported ? made : j->reported;
   j->reported_ms = now;
-  if (made >= LEAST && ms >= LEAST_MS && !fetches(j)) {
-    j->ends_ms = now + (int64_t)(ms * (1 - j->progress) / made);
+  const double done = j->reported - j->began_at, ms = (double)(now - j->began_ms);
+  if (done >= LEAST && ms >= LEAST_MS && !fetches(j)) {
+    j->ends_ms = now + (int64_t)(ms * (1 - j->reported) / done);
   }
 }
 
@@ -198,7 +201,11 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
         double base = (double)(j->dependency_count - j->waits_for);
         double shown = DEPENDENCIES_SHARE * (base + fraction) / (double)j->dependency_count;
         int stage_changed = strcmp(j->stage, stage) != 0;
-        advance(j, shown, is_guess);
+        if (is_guess) {
+          advance(j, shown);
+        } else {
+          report(j, shown);
+        }
         copy_text(j->stage, sizeof j->stage, stage);
         if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
           add_event(q, j, "progress", stage_changed);
@@ -250,7 +257,7 @@ static void move_on(queue *q, job *j, int64_t now) {
     return;
   }
   const double expected = 2 + 1e-3 * (double)j->row.cost; /* seconds, by triangles */
-  advance(j, j->progress + (span->to - j->progress) * seconds / (seconds + expected), 1);
+  advance(j, j->progress + (span->to - j->progress) * seconds / (seconds + expected));
   add_event(q, j, "progress", 0);
   if (j->row.kind == API_JOB_EMBEDDING) {
     show_to_dependents(q, j, j->stage, j->progress, 1);
@@ -285,7 +292,7 @@ void queue_progress(queue *q, job *j, const char *stage, double fraction) {
   const stage_span *span = span_of(j, stage);
   double shown = span ? span->from + fraction * (span->to - span->from) : 0;
   int stage_changed = strncmp(j->stage, stage, sizeof j->stage - 1) != 0;
-  advance(j, shown, 0);
+  report(j, shown);
   copy_text(j->stage, sizeof j->stage, stage);
   if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
     add_event(q, j, "progress", stage_changed);

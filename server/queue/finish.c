@@ -13,6 +13,7 @@ static void release_dependents(queue *q, job *ended) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
       if (is_for(ended, j->dependencies[d], j->row.owner)) {
         j->ready = --j->waits_for ? j->ready : unix_ms();
+        j->seconds_left = j->waits_for ? j->seconds_left : 0; /* until a worker takes it */
         if (ended->row.state == API_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
           j->dependency_problem = strdup(ended->row.problem);
         }

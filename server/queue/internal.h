@@ -31,8 +31,9 @@ struct job {
   double progress, embed_ms;
   int64_t began_ms;     /* when this attempt first reported progress, orb_clock_ms(); 0: it has not */
   double began_at;      /* how much that was */
+  double reported;      /* the most that this attempt has reported */
   int64_t reported_ms;  /* when it last did */
-  int64_t ends_ms;      /* when it ends by these, orb_clock_ms(); 0: not known */
+  int64_t ends_ms;      /* the estimated end, orb_clock_ms(); 0: not known */
   int64_t seconds_left; /* as last shown; 0: not known */
   int committed;        /* its row is in the catalogue */
   int dead;             /* its row could not be written */

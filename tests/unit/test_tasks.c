@@ -301,19 +301,17 @@ static void no_memory_is_told(void **unused) {
 }
 
 typedef struct reports {
-  int count;
+  int count, wrong;
   double last;
 } reports;
 
 static void note_report(void *user, const char *stage, double fraction) {
   reports *r = user;
-  assert_string_equal(stage, "align");
-  assert_true(fraction > r->last && fraction <= 1);
+  r->wrong += strcmp(stage, "align") != 0 || !(fraction > r->last && fraction <= 1); /* other threads cannot assert */
   r->last = fraction;
   r->count++;
 }
 
-/* Steps of tasks show as a share of what is expected, and of more of them something is always left. */
 static orb_status make_steps(orb_context *ctx, void *arg, int32_t i) {
   (void)arg;
   (void)i;
@@ -321,6 +319,7 @@ static orb_status make_steps(orb_context *ctx, void *arg, int32_t i) {
   return ORB_OK;
 }
 
+/* Steps of tasks show as a share of what is expected, and of more of them something is always left. */
 static void steps_are_reported_as_a_share(void **state) {
   (void)state;
   reports r = {.last = 0};
@@ -344,6 +343,7 @@ static void steps_are_reported_as_a_share(void **state) {
   orb_progress_expect(ctx, 0);
   orb_progress_steps(ctx, 1000);
   assert_int_equal(r.count, count);
+  assert_int_equal(r.wrong, 0);
   orb_context_destroy(ctx);
 }
 

@@ -620,7 +620,7 @@ export type Job = {
   stage: string | null;
   /** The progress of the whole job. */
   progress: number;
-  /** An estimate of the time that a running job still takes. Null while the job has not run for a second and made 5 % of progress since it began, if it fetches a file, and if it does not run. */
+  /** An estimate of the time that a running job still takes. Null until the job has run for a second and made 5 % of progress. A job that waits for its embeddings runs; the estimate begins anew when a worker takes it. Null if it fetches a file or does not run. */
   seconds_left: number | null;
   /** The result, once the job has succeeded. */
   result: string | null;

@@ -11,10 +11,12 @@
 #ifndef ORB_ALIGN_FIND_PARAMS_H
 #define ORB_ALIGN_FIND_PARAMS_H
 
-/* Steps that aligning a further shape is expected to take, and those for each of its vertices; only progress depends on
- * them (context.h). Of 13 pairs of people, animals and objects with 2,800 to 14,000 vertices, with landmarks and
- * without, each takes 1.5 to 10 million, 4 in the median. */
-static const double ORB_FIND_STEPS_PAIR = 1e6, ORB_FIND_STEPS_VERTEX = 500;
+/* Steps that the map of a further shape is expected to take, those for each of its vertices, and those for each vertex
+ * of a shape that follows its copy; only progress depends on them (context.h). Of 13 pairs of people, animals and
+ * objects with 2,800 to 14,000 vertices, with landmarks and without, each takes 1.5 to 10 million, 4 in the median. */
+static const double ORB_FIND_STEPS_MAP = 1e6, ORB_FIND_STEPS_VERTEX = 500, ORB_FIND_STEPS_LIFTED = 60;
+/* The same for each vertex where no map is composed: three stages of a walk (pin/walk.c), or a rotation. */
+static const double ORB_FIND_STEPS_PLACED = 60;
 
 /* Matches (match.c). */
 

@@ -29,7 +29,7 @@ enum {
   FINEST_WALK = 4000, /* none beyond this number of vertices */
   SETTLE = 60         /* most sweeps after all have arrived */
 };
-enum { STEPS_OF_VERTEX = 20 };          /* for progress: a stage takes as long as so many steps of a map (align.c) */
+enum { STEPS_OF_VERTEX = 20 }; /* for progress: for each vertex, a stage takes as long as so many steps of a map */
 static const double LEAST_SHARE = 0.6;  /* that a determinant keeps in one step */
 static const double SHORTER = 0.6;      /* a try's length relative to the one before it */
 static const double NO_PROGRESS = 1e-4; /* chords of all landmarks in one step: less ends the level */

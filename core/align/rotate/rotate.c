@@ -15,6 +15,7 @@
 static const double SPREAD = 0.03; /* second singular value of directions that span a plane: 10° off their axis */
 static const double NUDGE = 1e-9;  /* radians between attempts: rotations this near differ in how they round */
 enum { ATTEMPTS = 12 };            /* rotations that are tried until the rounded result is certified */
+enum { STEPS_OF_VERTEX = 60 };     /* for progress: for each vertex, a search takes as long as so many steps of a map */
 
 /* Do the landmarks of a shape determine its rotation: do they span a plane as directions? */
 static orb_status spans(orb_context *ctx, const double *points, int32_t count, int *yes) {
@@ -92,6 +93,7 @@ orb_status orb_rotate_by_search(orb_context *ctx, orb_sheet *sheets, int32_t sha
     double rotation[9];
     ORB_TRY(orb_rotation_search(ctx, &sheets[0].shape, &sheets[s].shape, rotation, NULL));
     ORB_TRY(rotate_sheet(ctx, &sheets[s], rotation));
+    orb_progress_steps(ctx, STEPS_OF_VERTEX * (int64_t)sheets[s].vertex_capacity);
   }
   return ORB_OK;
 }

@@ -39,7 +39,7 @@ void orb_map_patch_find_rim(orb_map_patch *patch);
  * ring contains a vertex with one of these flags. */
 double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, const unsigned char *taken, int *blocked);
 
-/* Flags the vertices of the end next to the limb, of all vertices of the surface; a pole is one. */
+/* reached: one flag for each vertex of the surface, set for those of the end that have a neighbour in the limb. */
 void orb_map_patch_reach(const orb_map_patch *patch, unsigned char *reached);
 
 #endif

@@ -18,7 +18,7 @@ ORB_MUST_CHECK orb_status orb_map_rotations_measure(orb_context *ctx, const orb_
                                                     const orb_map_image *map, double *back, double *rotation,
                                                     double whole[9], double *kept);
 
-/* The same area without the rest: what is kept halfway. O(n). */
+/* Only *kept. O(n). */
 ORB_MUST_CHECK orb_status orb_map_rotations_kept(orb_context *ctx, const orb_map_surface *b, const orb_map_image *map,
                                                  double *kept);
 

@@ -133,19 +133,32 @@ static int32_t find_pole(twist_run *run) {
   return pole;
 }
 
-int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, double share, orb_place *place) {
-  const int32_t *v = b->triangles + 3 * (size_t)place->triangle;
+/* The height of a place on its limb. 0: it is on none. A triangle beyond the end of a limb may have corners at it. */
+static double height_of(const orb_map_twists *twists, const int32_t *v, const orb_place *place, int32_t *limb) {
   double height = 0;
-  int32_t limb = -1;
+  int reaches = 0, leaves = 0;
+  *limb = -1;
   for (int k = 0; k < 3; k++) {
     height += place->at[k] * twists->height[v[k]];
-    limb = twists->of[v[k]] > limb ? twists->of[v[k]] : limb;
+    *limb = twists->of[v[k]] > *limb ? twists->of[v[k]] : *limb;
   }
-  if (limb < 0 || !(height > 0)) {
+  for (int k = 0; k < 3; k++) {
+    reaches |= twists->of[v[k]] == *limb && twists->height[v[k]] == 1;
+    leaves |= twists->of[v[k]] != *limb;
+  }
+  return *limb < 0 || (reaches && leaves) ? 0 : height;
+}
+
+int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, double share, int unwinds,
+                        orb_place *place) {
+  int32_t limb;
+  const double height = height_of(twists, b->triangles + 3 * (size_t)place->triangle, place, &limb);
+  if (!(height > 0)) {
     return 0;
   }
   const orb_map_twist *t = &twists->limb[limb];
-  if (t->count < 2 || (t->pole < 0 && share < 1)) {
+  const int is_wound = t->pole < 0;
+  if (t->count < 2 || (is_wound && !unwinds)) {
     return 0;
   }
   int k = 1;
@@ -154,7 +167,7 @@ int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, 
   }
   double gap = t->height[k] - t->height[k - 1], f = gap > 0 ? (height - t->height[k - 1]) / gap : 1;
   double angle = t->angle[k - 1] + fmin(1, fmax(0, f)) * (t->angle[k] - t->angle[k - 1]);
-  return orb_map_limb_rotate(b, twists->height, -share * angle, place);
+  return orb_map_limb_rotate(b, twists->height, is_wound ? -angle : -share * angle, place);
 }
 
 /* Scales the angles of a limb whose end stays to whole turns at the end. The limb counts as not twisted if they are
@@ -171,19 +184,23 @@ static void settle_turns(const orb_map_params *params, orb_map_twist *limb) {
   limb->count = counted ? limb->count : 0;
 }
 
-/* Gives the vertices of the current limb their limb and height. Limbs stay apart: its neighbours are closed to other
- * limbs. What lies beyond its end is not. */
+/* Gives the vertices of the current limb their limb and height. Limbs stay apart: its neighbours, and on the side of
+ * its end theirs, are closed to other limbs. What lies beyond is not. */
 static void add_places(twist_run *run, orb_map_twists *out) {
+  const orb_map_surface *b = run->b;
   orb_map_patch *patch = &run->patch;
   int blocked;
   orb_map_patch_find_rim(patch);
   (void)orb_map_patch_dilate(patch, run->held, run->taken, &blocked);
-  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+  for (int32_t v = 0; v < b->vertex_count; v++) {
     if (patch->inside[v] == ORB_PATCH_LIMB || run->reached[v]) {
       out->of[v] = out->count;
       out->height[v] = run->height[v];
     }
     run->taken[v] |= patch->inside[v] == ORB_PATCH_END ? run->reached[v] : patch->next[v];
+  }
+  for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
+    run->taken[b->triangles[orb_next(h)]] |= run->reached[b->triangles[h]];
   }
 }
 
@@ -207,31 +224,37 @@ static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
   return ORB_OK;
 }
 
+/* Does the limb lie on another one? */
+static int is_taken(const twist_run *run) {
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    if ((run->patch.inside[v] == ORB_PATCH_LIMB || run->reached[v]) && run->taken[v]) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
+/* Would the limb move a held vertex? */
+static int is_held(const twist_run *run) {
+  for (int32_t v = 0; v < run->b->vertex_count; v++) {
+    if (run->patch.inside[v] == ORB_PATCH_LIMB && run->held[v]) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
 /* A limb with a free end. */
 static orb_status examine_tip(twist_run *run, orb_map_twists *out) {
   unsigned char *inside = run->patch.inside;
   for (int32_t v = 0; v < run->b->vertex_count; v++) {
     inside[v] = inside[v] ? ORB_PATCH_LIMB : 0;
-    if (inside[v] && run->taken[v]) {
-      return ORB_OK;
-    }
   }
   const int32_t pole = find_pole(run);
   ORB_TRY(grow(run));
   inside[pole] = ORB_PATCH_END;
   orb_map_patch_reach(&run->patch, run->reached);
-  return add_limb(run, pole, out);
-}
-
-/* Is a vertex that the limb would move held, or one of another limb? */
-static int is_in_the_way(const twist_run *run) {
-  for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    const int moves = run->patch.inside[v] == ORB_PATCH_LIMB;
-    if ((moves && run->held[v]) || ((moves || run->reached[v]) && run->taken[v])) {
-      return 1;
-    }
-  }
-  return 0;
+  return is_taken(run) ? ORB_OK : add_limb(run, pole, out);
 }
 
 /* A limb whose end is held. What lies beyond the part but has no held vertex is of the limb. */
@@ -254,7 +277,7 @@ static orb_status examine_tube(twist_run *run, orb_map_twists *out) {
   ORB_TRY(grow(run));
   ORB_TRY(grow_into_end(run));
   orb_map_patch_reach(patch, run->reached);
-  return is_in_the_way(run) ? ORB_OK : add_limb(run, -1, out);
+  return is_taken(run) || is_held(run) ? ORB_OK : add_limb(run, -1, out);
 }
 
 /* Examines the piece that vertex `seed` represents. */

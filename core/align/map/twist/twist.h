@@ -16,14 +16,17 @@ typedef struct orb_map_twists {
 
 /* Finds the limbs that the map has twisted by more than a right angle, and those that it has wound by whole turns.
  * held: vertices of the surface whose partners are known. One on a twisted limb is its pole; one or more may lie beyond
- * a wound limb, and those on it hide the winding. O(n log n) for each held vertex of a posed part. */
+ * a wound limb, and those on it hide the winding. O(n log n), a dozen times if held vertices are on
+ * posed parts. */
 ORB_MUST_CHECK orb_status orb_map_twists_find(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
                                               const orb_map_image *map, const int32_t *held, int32_t held_count,
                                               orb_map_twists *out);
 void orb_map_twists_free(orb_context *ctx, orb_map_twists *twists);
 
-/* Rotates a place on a limb back by a share of its limb's twist there. 0: the place is on no limb and stays, as it does
- * on a wound limb with any share but 1. O(triangles around the limb). */
-int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, double share, orb_place *place);
+/* Rotates a place on a limb back by a share of its limb's twist there. A wound limb has no shares: its places are
+ * rotated back by all of it if unwinds is 1, and stay if it is 0. Returns 0 if the place stays. O(triangles around the
+ * limb). */
+int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, double share, int unwinds,
+                        orb_place *place);
 
 #endif

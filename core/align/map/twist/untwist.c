@@ -6,8 +6,8 @@
  * (orb_map_loosen), lowers the energy from there. Where triangles are large compared with the limb, flips remain; then
  * the limbs are rotated in smaller steps, each untangled and smoothed before the next, and if that folds too, one limb
  * after the other, so that one that folds does not stop the others. A limb that is wound by whole turns between two
- * landmarks has no smaller steps. Steps without any flip were tried: half of the
- * vertices get stuck on the way, and the twist stays.
+ * landmarks is unwound in one step only, the last. Steps without any flip were tried: half of the vertices get stuck on
+ * the way, and the twist stays.
  *
  * The result is kept if its energy is lower and if more of the area is left halfway through a linear morph. The energy
  * alone does not decide: a twist that is spread over a long limb costs little.
@@ -32,6 +32,7 @@ typedef struct untwisting {
   orb_map_level *l;
   const orb_map_twists *twists;
   double share; /* of the twists, undone in one step */
+  int unwinds;  /* this step undoes windings */
 } untwisting;
 
 static void untwist_range(void *arg, int64_t begin, int64_t end, int thread) {
@@ -39,7 +40,7 @@ static void untwist_range(void *arg, int64_t begin, int64_t end, int thread) {
   orb_map_level *l = u->l;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
-    if (!l->pinned[v] && orb_map_twists_undo(u->twists, &u->c->b, u->share, &l->place[v])) {
+    if (!l->pinned[v] && orb_map_twists_undo(u->twists, &u->c->b, u->share, u->unwinds, &l->place[v])) {
       orb_map_surface_at(&u->c->b, &l->place[v], NULL, l->x + 3 * v, NULL);
       orb_map_level_refresh(l, &u->c->b, (int32_t)v);
     }
@@ -124,6 +125,7 @@ static orb_status untwist_all(untwisting *u, const orb_corner_table *s, int step
     if (i > 0) {
       ORB_TRY(orb_map_sweeps(c, u->l, orb_map_hard(&c->params), c->params.untwist.step_sweeps));
     }
+    u->unwinds = i == steps - 1;
     ORB_TRY(orb_sliced_by(c->ctx, u->l->count, SLICE, 64, untwist_range, u));
     ORB_TRY(untangle(c, u->l, flips));
   }
@@ -140,7 +142,7 @@ static orb_status untwist_each(untwisting *u, const orb_corner_table *s, int32_t
   *flips = 1;
   ORB_GO(status, orb_map_full_level(c, c->best, s, u->l), done);
   orb_map_set_pull(c, u->l, s->to_mesh, 0);
-  u->share = 1;
+  u->share = u->unwinds = 1;
   for (int32_t i = 0; i < all->count; i++) {
     orb_map_twists one = *all;
     int32_t folded;
@@ -164,11 +166,11 @@ done:
   return status;
 }
 
-/* Steps in which the limbs can be untwisted: there is nothing between a wound limb and an unwound one. */
+/* Steps in which limbs can be untwisted: there is nothing between a wound limb and an unwound one. */
 static int most_steps(const orb_map_params *params, const orb_map_twists *twists) {
-  int most = params->untwist.steps;
+  int most = 1;
   for (int32_t k = 0; k < twists->count; k++) {
-    most = twists->limb[k].pole < 0 ? 1 : most;
+    most = twists->limb[k].pole >= 0 ? params->untwist.steps : most;
   }
   return most;
 }

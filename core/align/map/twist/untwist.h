@@ -15,7 +15,7 @@
 
 #include "align/map/engine/run.h"
 
-/* Untwists the limbs of the best map: all at once, by steps unless one is wound, or one by one. The result replaces the
+/* Untwists the limbs of the best map: all at once, by steps, or one by one. The result replaces the
  * best map if it is better. Does nothing if more than this share of the area is kept halfway through the morph. */
 ORB_MUST_CHECK orb_status orb_map_untwist(orb_map_run *run, double most_kept);
 
