@@ -73,8 +73,7 @@ static int is_large(const orb_align_shape *shapes, int32_t shape_count, const or
   for (int32_t s = 1; s < shape_count; s++) {
     most = shapes[s].mesh->vertex_count > most ? shapes[s].mesh->vertex_count : most;
   }
-  return options->preset != ORB_PRESET_FAST && most > params.copies.large &&
-         (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
+  return orb_align_composes(options) && most > params.copies.large;
 }
 
 static orb_status align_shapes(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -386,8 +385,7 @@ static orb_status align_pair(orb_context *ctx, const orb_align_shape shapes[2], 
 
 /* For progress. Of two shapes either may move. Copies of large ones are aligned, which they then follow. */
 static double expected_steps(const orb_align_shape *shapes, int32_t shape_count, const orb_align_options *options) {
-  const int composes =
-      options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
+  const int composes = orb_align_composes(options);
   const double large = orb_map_params_of(options->preset).copies.large;
   double steps = 0;
   for (int32_t s = 0; s < shape_count; s++) {

@@ -31,6 +31,11 @@
 #include "align/sheet/copies.h"
 #include "base/tasks.h"
 
+/* Are maps composed after the method? */
+static inline int orb_align_composes(const orb_align_options *options) {
+  return options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
+}
+
 /* Working copies with the landmarks as vertices, aligned by options->method and certified; no map is composed. */
 ORB_MUST_CHECK orb_status orb_align_by_method(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                               const orb_landmark *landmarks, int32_t landmark_count,

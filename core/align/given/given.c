@@ -81,8 +81,7 @@ end:
 static orb_status align_and_compose(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                     const orb_landmark *landmarks, int32_t landmark_count,
                                     const orb_align_options *options, int quick, orb_alignment *out) {
-  const int composes =
-      options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
+  const int composes = orb_align_composes(options);
   orb_status status;
   if (composes && quick && landmark_count > 0 && shape_count > 1) {
     status = orb_align_by_landmarks(ctx, shapes, shape_count, landmarks, landmark_count, options, out);

@@ -68,43 +68,32 @@ static double rotation_between(const band *low, const band *high) {
   return atan2(sine, cosine);
 }
 
-/* The vertices of the limb, of the ring around it and of the first ring of its end, by height. *rim: how many are
- * around it. */
-static orb_status rank(orb_map_patch *patch, const double *height, ranked *list, int32_t *count, int32_t *rim) {
-  const int32_t n = patch->b->vertex_count;
-  int blocked;
-  unsigned char *none = ORB_NEW0(patch->ctx, unsigned char, n), *reached = ORB_NEW0(patch->ctx, unsigned char, n);
-  const orb_status status = none && reached ? ORB_OK : ORB_E_NO_MEMORY;
-  *count = *rim = 0;
-  if (status == ORB_OK) {
-    orb_map_patch_find_rim(patch);
-    (void)orb_map_patch_dilate(patch, none, none, &blocked);
-    orb_map_patch_reach(patch, reached);
-  }
-  for (int32_t v = 0; v < n && status == ORB_OK; v++) {
-    if (patch->next[v] && (patch->inside[v] != ORB_PATCH_END || reached[v])) {
-      list[(*count)++] = (ranked){patch->inside[v] ? height[v] : 0, v};
+/* Lists the vertices of the limb, of the ring around it and of the first ring of its end, by height. Returns how many
+ * there are. *rim: how many are around it. */
+static int32_t rank(orb_map_patch *patch, const double *height, ranked *list, int32_t *rim) {
+  int32_t count = 0;
+  *rim = 0;
+  orb_map_patch_find_rim(patch);
+  (void)orb_map_patch_dilate(patch);
+  for (int32_t v = 0; v < patch->b->vertex_count; v++) {
+    if (patch->next[v] && (patch->inside[v] != ORB_PATCH_END || patch->reached[v])) {
+      list[count++] = (ranked){patch->inside[v] ? height[v] : 0, v};
       *rim += !patch->inside[v];
     }
   }
-  if (status == ORB_OK) {
-    qsort(list, (size_t)*count, sizeof *list, by_height);
-  }
-  orb_free(patch->ctx, none);
-  orb_free(patch->ctx, reached);
-  return status;
+  qsort(list, (size_t)count, sizeof *list, by_height);
+  return count;
 }
 
 orb_status orb_map_bands_measure(const orb_map_params *params, orb_map_patch *patch, const double *height,
                                  const double *back, orb_map_twist *out) {
-  int32_t n = 0, rim = 0;
+  int32_t rim;
   band low, high;
   ranked *list = ORB_NEW(patch->ctx, ranked, patch->b->vertex_count);
-  orb_status status = list ? rank(patch, height, list, &n, &rim) : ORB_E_NO_MEMORY;
-  if (status != ORB_OK) {
-    orb_free(patch->ctx, list);
-    return status;
+  if (!list) {
+    return ORB_E_NO_MEMORY;
   }
+  const int32_t n = rank(patch, height, list, &rim);
   int32_t bands = (n - rim) / params->twist.band_vertices, wanted = bands < ORB_MAP_BANDS ? bands : ORB_MAP_BANDS;
   int fine = wanted >= params->twist.bands && fit_band(patch->b, back, list, rim, &low);
   out->height[0] = out->angle[0] = 0;

@@ -16,7 +16,8 @@ typedef struct orb_map_twist {
 
 /* Sums up the rotation from the limb's rim to each of its bands, rings of vertices of similar height: out->height,
  * angle and count, which is 0 where there are too few vertices. back: where the surface's vertices come from. Bands end
- * at the end of the limb. Overwrites the patch's rings. O(n log n). */
+ * at the end of the limb. patch: with `reached` set; its rings are
+ * overwritten. O(n log n). */
 ORB_MUST_CHECK orb_status orb_map_bands_measure(const orb_map_params *params, orb_map_patch *patch,
                                                 const double *height, const double *back, orb_map_twist *out);
 

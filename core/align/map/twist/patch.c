@@ -11,10 +11,11 @@ orb_status orb_map_patch_create(orb_context *ctx, const orb_map_surface *b, orb_
   *patch = (orb_map_patch){.ctx = ctx, .b = b};
   patch->inside = ORB_NEW0(ctx, unsigned char, n);
   patch->next = ORB_NEW0(ctx, unsigned char, n);
+  patch->reached = ORB_NEW0(ctx, unsigned char, n);
   patch->joined = ORB_NEW(ctx, int32_t, n);
   patch->corner = ORB_NEW(ctx, int32_t, n);
   patch->rim = ORB_NEW(ctx, int32_t, n);
-  if (!patch->inside || !patch->next || !patch->joined || !patch->corner || !patch->rim) {
+  if (!patch->inside || !patch->next || !patch->reached || !patch->joined || !patch->corner || !patch->rim) {
     orb_map_patch_free(patch);
     return ORB_E_NO_MEMORY;
   }
@@ -27,6 +28,7 @@ orb_status orb_map_patch_create(orb_context *ctx, const orb_map_surface *b, orb_
 void orb_map_patch_free(orb_map_patch *patch) {
   orb_free(patch->ctx, patch->inside);
   orb_free(patch->ctx, patch->next);
+  orb_free(patch->ctx, patch->reached);
   orb_free(patch->ctx, patch->joined);
   orb_free(patch->ctx, patch->corner);
   orb_free(patch->ctx, patch->rim);
@@ -127,10 +129,9 @@ static double rim_length(const orb_map_patch *patch) {
   return length;
 }
 
-double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, const unsigned char *taken, int *blocked) {
+double orb_map_patch_dilate(orb_map_patch *patch) {
   const orb_map_surface *b = patch->b;
   int32_t old = patch->rim_count, count = old;
-  *blocked = 0;
   for (int32_t i = 0; i < old; i++) {
     int32_t first = patch->corner[patch->rim[i]], h = first;
     do {
@@ -138,7 +139,6 @@ double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, con
       if (!patch->next[u]) {
         patch->next[u] = ORB_PATCH_LIMB;
         patch->rim[count++] = u;
-        *blocked |= held[u] || taken[u];
       }
       h = swing(b, h);
     } while (h != first);
@@ -148,11 +148,12 @@ double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, con
   return rim_length(patch);
 }
 
-void orb_map_patch_reach(const orb_map_patch *patch, unsigned char *reached) {
+void orb_map_patch_reach(orb_map_patch *patch) {
   const orb_map_surface *b = patch->b;
-  memset(reached, 0, (size_t)b->vertex_count);
+  memset(patch->reached, 0, (size_t)b->vertex_count);
   for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
     int32_t v = b->triangles[h];
-    reached[v] |= patch->inside[v] == ORB_PATCH_END && patch->inside[b->triangles[orb_next(h)]] == ORB_PATCH_LIMB;
+    patch->reached[v] |=
+        patch->inside[v] == ORB_PATCH_END && patch->inside[b->triangles[orb_next(h)]] == ORB_PATCH_LIMB;
   }
 }

@@ -12,11 +12,12 @@ enum {
 typedef struct orb_map_patch {
   orb_context *ctx;
   const orb_map_surface *b;
-  unsigned char *inside; /* one flag for each vertex of the surface: 0, ORB_PATCH_LIMB or ORB_PATCH_END */
-  unsigned char *next;   /* the same while the part grows */
-  int32_t *joined;       /* a representative of each vertex's piece; union-find */
-  int32_t *corner;       /* a half-edge out of each vertex */
-  int32_t *rim;          /* the last ring that was added */
+  unsigned char *inside;  /* one flag for each vertex of the surface: 0, ORB_PATCH_LIMB or ORB_PATCH_END */
+  unsigned char *next;    /* the same while the part grows */
+  unsigned char *reached; /* 1 for the vertices of the end that have a neighbour in the limb */
+  int32_t *joined;        /* a representative of each vertex's piece; union-find */
+  int32_t *corner;        /* a half-edge out of each vertex */
+  int32_t *rim;           /* the last ring that was added */
   int32_t rim_count;
 } orb_map_patch;
 
@@ -35,11 +36,10 @@ ORB_MUST_CHECK orb_status orb_map_patch_fill(orb_map_patch *patch, int flag);
 /* Makes patch->next a copy of the flags, and patch->rim the vertices inside with a neighbour outside. */
 void orb_map_patch_find_rim(orb_map_patch *patch);
 
-/* Adds the ring of vertices around the rim to patch->next, and makes it the new rim. Returns its length. *blocked: the
- * ring contains a vertex with one of these flags. */
-double orb_map_patch_dilate(orb_map_patch *patch, const unsigned char *held, const unsigned char *taken, int *blocked);
+/* Adds the ring of vertices around the rim to patch->next, and makes it the new rim. Returns its length. */
+double orb_map_patch_dilate(orb_map_patch *patch);
 
-/* reached: one flag for each vertex of the surface, set for those of the end that have a neighbour in the limb. */
-void orb_map_patch_reach(const orb_map_patch *patch, unsigned char *reached);
+/* Sets patch->reached. */
+void orb_map_patch_reach(orb_map_patch *patch);
 
 #endif

@@ -36,10 +36,19 @@ typedef struct twist_run {
   const double *reference; /* the rotation that parts are compared with: that of the whole, or at a held vertex */
   double *height;          /* in the current limb */
   orb_map_patch patch;
-  unsigned char *held;
-  unsigned char *taken;   /* in or next to an earlier limb */
-  unsigned char *reached; /* of the end, next to the limb */
+  unsigned char *held, *taken; /* taken: in or next to an earlier limb */
 } twist_run;
+
+/* Is a vertex of the rim held, or one of another limb? */
+static int is_blocked(const twist_run *run) {
+  const orb_map_patch *patch = &run->patch;
+  for (int32_t k = 0; k < patch->rim_count; k++) {
+    if (run->held[patch->rim[k]] || run->taken[patch->rim[k]]) {
+      return 1;
+    }
+  }
+  return 0;
+}
 
 /* Adds rings to the flags inside until they widen, or a held vertex or another limb is in the way. */
 static orb_status add_rings(twist_run *run) {
@@ -48,10 +57,9 @@ static orb_status add_rings(twist_run *run) {
   int rings = (int)(run->params->twist.growth * sqrt(fmax(1, run->b->vertex_count / GROWTH_VERTICES)));
   orb_map_patch_find_rim(patch);
   for (int i = 0; i < rings && patch->rim_count > 0; i++) {
-    int blocked;
-    double length = orb_map_patch_dilate(patch, run->held, run->taken, &blocked);
+    double length = orb_map_patch_dilate(patch);
     narrowest = fmin(narrowest, length);
-    if (blocked || length > run->params->twist.wider * narrowest) {
+    if (is_blocked(run) || length > run->params->twist.wider * narrowest) {
       break;
     }
     for (int32_t k = 0; k < patch->rim_count; k++) {
@@ -189,18 +197,17 @@ static void settle_turns(const orb_map_params *params, orb_map_twist *limb) {
 static void add_places(twist_run *run, orb_map_twists *out) {
   const orb_map_surface *b = run->b;
   orb_map_patch *patch = &run->patch;
-  int blocked;
   orb_map_patch_find_rim(patch);
-  (void)orb_map_patch_dilate(patch, run->held, run->taken, &blocked);
+  (void)orb_map_patch_dilate(patch);
   for (int32_t v = 0; v < b->vertex_count; v++) {
-    if (patch->inside[v] == ORB_PATCH_LIMB || run->reached[v]) {
+    if (patch->inside[v] == ORB_PATCH_LIMB || patch->reached[v]) {
       out->of[v] = out->count;
       out->height[v] = run->height[v];
     }
-    run->taken[v] |= patch->inside[v] == ORB_PATCH_END ? run->reached[v] : patch->next[v];
+    run->taken[v] |= patch->inside[v] == ORB_PATCH_END ? patch->reached[v] : patch->next[v];
   }
   for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
-    run->taken[b->triangles[orb_next(h)]] |= run->reached[b->triangles[h]];
+    run->taken[b->triangles[orb_next(h)]] |= patch->reached[b->triangles[h]];
   }
 }
 
@@ -227,7 +234,7 @@ static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
 /* Does the limb lie on another one? */
 static int is_taken(const twist_run *run) {
   for (int32_t v = 0; v < run->b->vertex_count; v++) {
-    if ((run->patch.inside[v] == ORB_PATCH_LIMB || run->reached[v]) && run->taken[v]) {
+    if ((run->patch.inside[v] == ORB_PATCH_LIMB || run->patch.reached[v]) && run->taken[v]) {
       return 1;
     }
   }
@@ -253,7 +260,7 @@ static orb_status examine_tip(twist_run *run, orb_map_twists *out) {
   const int32_t pole = find_pole(run);
   ORB_TRY(grow(run));
   inside[pole] = ORB_PATCH_END;
-  orb_map_patch_reach(&run->patch, run->reached);
+  orb_map_patch_reach(&run->patch);
   return is_taken(run) ? ORB_OK : add_limb(run, pole, out);
 }
 
@@ -276,7 +283,7 @@ static orb_status examine_tube(twist_run *run, orb_map_twists *out) {
   }
   ORB_TRY(grow(run));
   ORB_TRY(grow_into_end(run));
-  orb_map_patch_reach(patch, run->reached);
+  orb_map_patch_reach(patch);
   return is_taken(run) || is_held(run) ? ORB_OK : add_limb(run, -1, out);
 }
 
@@ -391,9 +398,7 @@ orb_status orb_map_twists_find(orb_context *ctx, const orb_map_params *params, c
   run.height = ORB_NEW(ctx, double, n);
   run.held = ORB_NEW0(ctx, unsigned char, n);
   run.taken = ORB_NEW0(ctx, unsigned char, n);
-  run.reached = ORB_NEW0(ctx, unsigned char, n);
-  if (!out->of || !out->height || !run.back || !run.rotation || !run.height || !run.held || !run.taken ||
-      !run.reached) {
+  if (!out->of || !out->height || !run.back || !run.rotation || !run.height || !run.held || !run.taken) {
     goto done;
   }
   ORB_GO(status, orb_map_patch_create(ctx, b, &run.patch), done);
@@ -411,7 +416,6 @@ done:
   orb_free(ctx, run.height);
   orb_free(ctx, run.held);
   orb_free(ctx, run.taken);
-  orb_free(ctx, run.reached);
   orb_map_patch_free(&run.patch);
   if (status != ORB_OK) {
     orb_map_twists_free(ctx, out);
