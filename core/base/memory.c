@@ -249,6 +249,18 @@ void orb_free(orb_context *ctx, void *block) {
   }
 }
 
+orb_status orb_memory_charge(orb_context *ctx, size_t bytes) {
+  if (!charge(ctx, bytes, 1)) {
+    (void)out_of_memory(ctx, bytes, 1);
+    return ORB_E_NO_MEMORY;
+  }
+  return ORB_OK;
+}
+
+void orb_memory_discharge(orb_context *ctx, size_t bytes) {
+  discharge(ctx, bytes, 1);
+}
+
 size_t orb_memory_used(const orb_context *ctx) {
   return atomic_load(&ctx->root->memory_used);
 }

@@ -2,12 +2,13 @@
 """Measures maps against dense truth, and writes docs/bench-correspond.md.
 
     tests/bench/correspond.py [--bin build/bin] [--base DIR-OR-REVISION] [--set people,animals,real] [--half choose|report|all]
-                              [--seeds N,…] [--given 0,8] [--preset default] [--change none,swapped,turned,refined] [--sample K] [--pairs A-B,…] [--jobs 1]
+                              [--seeds N,…] [--given 0,8] [--preset default] [--change none,swapped,turned,refined] [--changed-given 0] [--sample K] [--pairs A-B,…] [--jobs 1]
                               [--store DIR] [--fresh] [--out FILE.md] [--json FILE.json]
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
-docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed, `parts` 81 heads and busts. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half that is
-only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
+docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed, `parts` 81 heads and busts, `apes` 48 people
+with the proportions of an ape and other people. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half
+that is only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
 shape swapped, the second one rotated and its vertices and triangles shuffled, its triangles cut into four.
@@ -301,6 +302,7 @@ def list_pairs(options):
     sets = {"people": correspond_pairs.posed(meshes),
             "animals": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store),
             "drawn": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, map(int, options.seeds.split(","))),
+            "apes": correspond_pairs.ape_pairs(meshes, options.store),
             "parts": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, of_parts=True),
             "real": correspond_pairs.real(meshes, surface_of)}
     unknown = set(wanted) - set(sets)
@@ -332,6 +334,7 @@ def main():
     parser.add_argument("--sample", type=int, help="so many pairs of each set")
     parser.add_argument("--pairs", help="names with commas")
     parser.add_argument("--change", default="none", help="names with commas")
+    parser.add_argument("--changed-given", help="of --given, those with which changes are measured (default: all)")
     parser.add_argument("--list", action="store_true", help="print the pairs and end")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="maps at once")
@@ -356,8 +359,9 @@ def main():
     changes = options.change.split(",")
     if set(changes) - {"none", "swapped", *correspond_changes.CHANGES}:
         sys.exit("correspond.py: --change: none, swapped, " + ", ".join(correspond_changes.CHANGES))
+    changed = (options.changed_given or options.given).split(",")
     work = [(pair, name, int(n), change) for pair in pairs for n in options.given.split(",") for name in programs
-            for change in changes]
+            for change in changes if change == "none" or n in changed]
 
     def one(item):
         pair, name, given, change = item

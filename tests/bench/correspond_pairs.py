@@ -6,8 +6,11 @@ import itertools
 import json
 import pathlib
 import random
+import shutil
 import subprocess
 import tempfile
+
+import apes
 
 CHOSEN_ON = (11, 13, 17, 19, 29)  # seeds of drawn pairs; on 29 only weights of the confidence and of costs
 PLACES = 250  # measured a pair; with four targets each and 24 landmarks these are the 1,024 landmarks of a request
@@ -102,6 +105,32 @@ def posed(meshes):
     """People in poses. Constants were first chosen on even rows of pairs.csv, so these stay the half `choose`."""
     if (meshes / "posed").is_dir():
         yield from folder_pairs("people", meshes / "posed", listed(meshes / "posed"), lambda i, _: ("choose", "report")[i % 2])
+
+
+def ape_pairs(meshes, store):
+    """People with the proportions of an ape and other people, both in poses. A body is written when it is first needed."""
+    source, folder = meshes / "posed", store / "apes"
+    if not source.is_dir():
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(source / "samples.csv", folder)
+    rows = apes.pairs([file.name for file in source.iterdir() if file.suffix in (".obj", ".off")])
+
+    def make(*names):
+        for name in names:
+            body = name.removeprefix("ape-")
+            if (folder / name).exists():
+                continue
+            person = next(source.glob(f"{pathlib.Path(body).stem}.o*"))
+            shutil.copy(person.with_suffix(".truth.csv"), folder / f"{pathlib.Path(name).stem}.truth.csv")
+            if name == body:
+                shutil.copy(person, folder)
+            else:
+                part = folder / f"{name}.part"
+                apes.write_ape(person, read_truth(person), folder / "samples.csv", part)
+                part.rename(folder / name)
+
+    yield from folder_pairs("apes", folder, rows, lambda i, _: "report" if i % apes.CHOSEN_ON else "choose", make)
 
 
 def animals(program, store, seeds=(), of_parts=False):

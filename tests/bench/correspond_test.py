@@ -9,6 +9,7 @@ import sys
 import tempfile
 import unittest
 
+import apes
 import correspond
 import correspond_changes
 import correspond_pairs
@@ -40,6 +41,33 @@ class Correspond(unittest.TestCase):
         self.assertEqual({len(both) for both in kinds}, {2})
         self.assertEqual({kinds.count(both) for both in kinds}, {4})
         self.assertEqual(len(set(kinds)), 21)
+
+    def test_an_ape_keeps_its_triangles_and_changes_its_limbs(self):
+        """With a cat for a person: its forelegs are the arms, its hind legs the legs."""
+        cat, limbs = self.surfaces[0], {}
+        for vertex in range(len(cat.positions)):
+            x, y, z = cat.positions[vertex]
+            limbs.setdefault((x > 0, z > 0), []).append((y, vertex))
+        feet = [min(corner)[1] for corner in limbs.values()]
+        self.assertEqual(len(set(feet)), 4)
+        top = max(range(len(cat.positions)), key=lambda v: cat.positions[v][1])
+        parts = dict(enumerate(["arm.L", "leg.L", "arm.R", "leg.R"][:len(feet)] + ["torso"]))
+        of, truth = {}, {}
+        for sample, vertex in enumerate([*feet, top]):
+            truth[sample] = correspond_pairs.vertex_place(cat, vertex, of)
+        positions, triangles = apes.ape_of(cat.file, truth, parts)
+        self.assertEqual(triangles, cat.triangles)
+        for sample, vertex in enumerate(feet):
+            near = [v for v in range(len(positions)) if math.dist(cat.positions[v], cat.positions[vertex]) < 0.03 * cat.diagonal]
+            spread = [max(math.dist(at[v], at[vertex]) for v in near) for at in (cat.positions, positions)]
+            self.assertAlmostEqual(spread[1] / spread[0], apes.SCALES[parts[sample].split(".")[0]], delta=0.1)
+
+    def test_apes_are_paired_with_other_people(self):
+        files = ["ada-run.obj", "ben-sit.off", "cora-run.obj", "cora-sit.obj"]
+        rows = apes.pairs(files)
+        self.assertEqual(rows, apes.pairs(reversed(files)))
+        self.assertEqual(len(rows), 2 * len(files))
+        self.assertTrue(all(first.removeprefix("ape-").split("-")[0] != second.split("-")[0] for first, second, _ in rows))
 
     def test_bodies_are_closed_and_of_their_own_triangles(self):
         for surface in self.surfaces:

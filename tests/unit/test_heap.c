@@ -53,6 +53,24 @@ static void a_block_keeps_its_bytes_as_it_grows_and_shrinks(void **state) {
   orb_context_destroy(ctx);
 }
 
+/* Memory that a program holds besides leaves less for blocks, until it is discharged. */
+static void what_is_charged_counts(void **state) {
+  orb_context *ctx;
+  (void)state;
+  assert_int_equal(orb_context_create(&(orb_context_options){.threads = 1, .memory_limit = 2 * LARGE}, &ctx), ORB_OK);
+  assert_int_equal(orb_memory_charge(ctx, LARGE), ORB_OK);
+  assert_int_equal(orb_memory_used(ctx), LARGE);
+  assert_int_equal(orb_memory_charge(ctx, LARGE + 1), ORB_E_NO_MEMORY);
+  assert_int_equal(orb_context_error(ctx)->status, ORB_E_NO_MEMORY);
+  assert_null(orb_alloc(ctx, LARGE, 1));
+  orb_memory_discharge(ctx, LARGE);
+  assert_int_equal(orb_memory_used(ctx), 0);
+  void *block = orb_alloc(ctx, LARGE, 1);
+  assert_non_null(block);
+  orb_free(ctx, block);
+  orb_context_destroy(ctx);
+}
+
 /* malloc() hands out what was freed, whatever is in it. */
 static void a_zeroed_block_is_zero(void **state) {
   orb_context *ctx;
@@ -113,7 +131,7 @@ static void freed_pages_serve_again(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(a_block_keeps_its_bytes_as_it_grows_and_shrinks),
-                                     cmocka_unit_test(a_zeroed_block_is_zero),
+                                     cmocka_unit_test(what_is_charged_counts), cmocka_unit_test(a_zeroed_block_is_zero),
                                      cmocka_unit_test(freed_pages_serve_again)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -64,19 +64,25 @@ static int32_t least_of(const contest *c, int32_t omit) {
   return least;
 }
 
-/* The match walks both ways side by side. If both walks are poor, the next best match walks too. */
+/* Does the next best match walk too? If both walks of the match are poor, or if the costs do not tell which is better.
+ */
+static int second_walks(const contest *c) {
+  if (c->landmark_count > 0 || c->match->other_count == 0) {
+    return 0;
+  }
+  const double behind = c->match->other[0].cost;
+  return behind <= ORB_FIND_CONTEST_TIE || (c->known > ORB_FIND_CONTEST_POOR && behind <= ORB_FIND_CONTEST_BEHIND);
+}
+
+/* The match walks both ways side by side, and then the next best one, if need be. */
 static orb_status walk_all(orb_context *ctx, contest *c) {
   c->round[0] = MATCH;
   c->round[1] = TURNED;
   c->count = first_may_move(c) ? 2 : 1;
   ORB_TRY(orb_tasks_run(ctx, c->count, walk, c));
   c->known = fmin(c->known, fmin(c->energy[MATCH], c->energy[TURNED]));
-  if (c->landmark_count > 0 || c->known <= ORB_FIND_CONTEST_POOR || c->match->other_count == 0 ||
-      c->match->other[0].cost > ORB_FIND_CONTEST_BEHIND) {
-    return ORB_OK;
-  }
   c->round[0] = SECOND;
-  return walk(ctx, c, 0);
+  return second_walks(c) ? walk(ctx, c, 0) : ORB_OK;
 }
 
 static orb_status finish(orb_context *ctx, void *arg, int32_t i) {

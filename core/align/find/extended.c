@@ -33,8 +33,7 @@ static orb_status extend(orb_context *ctx, const orb_trials *t, orb_agreed *agre
   if (!*extended) {
     return ORB_OK;
   }
-  ORB_TRY(orb_trial_register(ctx, t, one, 0));
-  ORB_TRY(orb_trial_register(ctx, t, one, 1));
+  ORB_TRY(orb_trial_register_both(ctx, t, one));
   orb_trial_fill_cost(t, one, 2);
   return ORB_OK;
 }

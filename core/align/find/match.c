@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/branched.h"
 #include "align/find/crossed.h"
 #include "align/find/extended.h"
 #include "align/find/hinted.h"
@@ -201,6 +202,7 @@ static orb_status improve_trials(orb_trials *small, int are_unlike) {
   if (!leaves_limbs_open(&small->hint, are_unlike) || !orb_trials_bend_much(small)) {
     return ORB_OK;
   }
+  ORB_TRY(orb_trials_branch(small));
   ORB_TRY(orb_trials_find_symmetries(small));
   ORB_TRY(orb_trials_extend(small));
   ORB_TRY(orb_trials_cross(small));

@@ -7,6 +7,8 @@
  *   hint.h    what landmarks say of a match
  *   survey.h  what trials share of a copy
  *   tips.h    tips of limbs, and rotations of the spheres under which they meet
+ *   branches.h, branched.h
+ *             matches of tips by how limbs branch, and trials of them
  *   evidence.h what a registration tells beside its bend
  *   trials.h  rough maps, registered and ranked
  *   agreed.h, extended.h
@@ -28,9 +30,10 @@
  * depend on proportions. A map of the right limbs bends the copies least, even if it is off at their tips. A twin (left
  * and right swapped with front and back) bends them more, and often also rotates them in space.
  *
- * All maps are tried on small copies, where a registration takes 3 ms; where shapes bend much, all are extended
- * there, those near the best are crossed, and the best are mirrored. The best few are registered again on copies three
- * times as fine, and ranked. Bodies in poses, which bend little, get maps made on these finer copies as well.
+ * All maps are tried on small copies, where a registration takes 3 ms; where shapes bend much, those of branches are
+ * added and all are extended there, those near the best are crossed, and the best are mirrored. The best few are
+ * registered again on copies three times as fine, and ranked. Bodies in poses, which bend little, get maps made on
+ * these finer copies as well.
  *
  * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on
  * the course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by

@@ -178,8 +178,7 @@ static orb_status mirror(orb_context *ctx, const orb_trials *t, const orb_trial 
   const double *const position[2] = {out->pose[0].position, out->pose[1].position};
   /* where nothing is extended, the maps stay as filled */
   ORB_GO(status, orb_agreed_extend(ctx, &agreed, position, 1, out->own[0], out->own[1], &extended), end);
-  ORB_GO(status, orb_trial_register(ctx, t, out, 0), end);
-  ORB_GO(status, orb_trial_register(ctx, t, out, 1), end);
+  ORB_GO(status, orb_trial_register_both(ctx, t, out), end);
   status = weigh_trial(ctx, t, position, 2, t, out);
 end:
   images_free(&m);

@@ -77,11 +77,16 @@ orb_status orb_tips_find(orb_context *ctx, const orb_coarse_copy *copy, const or
       }
     }
   }
+  int32_t middle = 0;
+  for (int32_t v = 1; v < n && status == ORB_OK; v++) {
+    middle = mean[v] < mean[middle] ? v : middle;
+  }
   for (int32_t i = 0; i < out->count; i++) {
+    out->middle[i] = orb_survey_apart(survey, &copy->mesh, out->vertex[i], middle);
     memcpy(out->point[i], copy->points + 3 * (size_t)out->vertex[i], sizeof out->point[i]);
     for (int32_t k = 0; k < out->count; k++) {
-      const float apart = survey->apart[(size_t)out->vertex[i] * (size_t)n + (size_t)out->vertex[k]];
-      out->log_apart[i][k] = log((double)apart + ORB_FIND_AGREED_EDGE);
+      out->apart[i][k] = orb_survey_apart(survey, &copy->mesh, out->vertex[i], out->vertex[k]);
+      out->log_apart[i][k] = log(out->apart[i][k] + ORB_FIND_AGREED_EDGE);
     }
   }
   orb_free(ctx, area);
@@ -93,8 +98,7 @@ static double angle(const double p[3], const double q[3]) {
   return acos(fmin(1, fmax(-1, orb_dot(p, q))));
 }
 
-/* The rotation that takes the tips best to their partners. */
-static void fit(const orb_tips *first, const orb_tips *second, orb_tip_match *m) {
+void orb_tip_match_fit(const orb_tips *first, const orb_tips *second, orb_tip_match *m) {
   double h[9] = {0};
   for (int32_t i = 0; i < first->count; i++) {
     if (m->to[i] >= 0) {
@@ -137,27 +141,33 @@ static void find_partners(const orb_tips *first, const orb_tips *second, orb_tip
   }
 }
 
-static double cost_of(const orb_tips *first, const orb_tips *second, const orb_tip_match *m) {
-  const int32_t most = first->count < second->count ? first->count : second->count;
-  double away = 0, stretched = 0;
+double orb_tip_match_angle(const orb_tips *first, const orb_tips *second, const orb_tip_match *m) {
+  double away = 0;
   for (int32_t i = 0; i < first->count; i++) {
     double p[3];
-    if (m->to[i] < 0) {
-      continue;
+    if (m->to[i] >= 0) {
+      orb_rotate_point(m->rotation, first->point[i], p);
+      away += angle(p, second->point[m->to[i]]) / m->count;
     }
-    orb_rotate_point(m->rotation, first->point[i], p);
-    away += angle(p, second->point[m->to[i]]) / m->count;
-    for (int32_t k = 0; k < i; k++) {
+  }
+  return away;
+}
+
+static double cost_of(const orb_tips *first, const orb_tips *second, const orb_tip_match *m) {
+  const int32_t most = first->count < second->count ? first->count : second->count;
+  double stretched = 0;
+  for (int32_t i = 0; i < first->count; i++) {
+    for (int32_t k = 0; k < i && m->to[i] >= 0; k++) {
       stretched += m->to[k] < 0 ? 0 : fabs(first->log_apart[i][k] - second->log_apart[m->to[i]][m->to[k]]);
     }
   }
-  return away + stretched / (m->count * (m->count - 1) / 2.0) + ORB_FIND_TIP_ALONE * (most - m->count);
+  return orb_tip_match_angle(first, second, m) + stretched / (m->count * (m->count - 1) / 2.0) +
+         ORB_FIND_TIP_ALONE * (most - m->count);
 }
 
-/* Inserts a match in order, unless it is listed. Returns how many there are. */
-static int32_t keep(const orb_tip_match *m, int32_t tips, int32_t most, int32_t count, orb_tip_match *list) {
+int32_t orb_tip_match_keep(const orb_tip_match *m, int32_t most, int32_t count, orb_tip_match *list) {
   for (int32_t i = 0; i < count; i++) {
-    if (memcmp(list[i].to, m->to, (size_t)tips * sizeof *m->to) == 0) {
+    if (memcmp(list[i].to, m->to, sizeof m->to) == 0) {
       return count;
     }
   }
@@ -181,13 +191,13 @@ static int match_from(const orb_tips *first, const orb_tips *second, const int32
   m->to[pair[0]] = pair[2];
   m->to[pair[1]] = pair[3];
   for (int turn = 0; turn < TURNS; turn++) {
-    fit(first, second, m);
+    orb_tip_match_fit(first, second, m);
     find_partners(first, second, m);
     if (m->count < LEAST) {
       return 0;
     }
   }
-  fit(first, second, m);
+  orb_tip_match_fit(first, second, m);
   m->cost = cost_of(first, second, m);
   return 1;
 }
@@ -203,7 +213,7 @@ int32_t orb_tips_match(const orb_tips *first, const orb_tips *second, int32_t mo
           if (pair[2] != pair[3] &&
               fabs(apart - angle(second->point[pair[2]], second->point[pair[3]])) < ORB_FIND_TIP_ANGLE &&
               match_from(first, second, pair, &m)) {
-            count = keep(&m, first->count, most, count, out);
+            count = orb_tip_match_keep(&m, most, count, out);
           }
         }
       }

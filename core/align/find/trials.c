@@ -278,6 +278,11 @@ orb_status orb_trial_register(orb_context *ctx, const orb_trials *t, orb_trial *
   return ORB_OK;
 }
 
+orb_status orb_trial_register_both(orb_context *ctx, const orb_trials *t, orb_trial *one) {
+  ORB_TRY(orb_trial_register(ctx, t, one, 0));
+  return orb_trial_register(ctx, t, one, 1);
+}
+
 /* Trials that are registered at once. */
 typedef struct registered {
   orb_trials *t;

@@ -17,7 +17,7 @@
 #include "spectral/spectral.h"
 
 enum {
-  ORB_TRIALS_MAX = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS + ORB_FIND_TIPS,
+  ORB_TRIALS_MAX = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS + ORB_FIND_TIPS + ORB_FIND_BRANCHED,
   ORB_TRIALS_LISTED = 5 /* trials that are listed at most: the best one, and others that differ */
 };
 
@@ -113,6 +113,9 @@ ORB_MUST_CHECK orb_status orb_trials_complete(orb_context *ctx, orb_trials *tria
  * tells. Both copies must have been surveyed. May run beside others.
  */
 ORB_MUST_CHECK orb_status orb_trial_register(orb_context *ctx, const orb_trials *trials, orb_trial *one, int s);
+
+/* The same in both directions, one after the other. */
+ORB_MUST_CHECK orb_status orb_trial_register_both(orb_context *ctx, const orb_trials *trials, orb_trial *one);
 
 /* The vertices of the other copy on which pose s takes those of copy s. */
 void orb_trial_images(const orb_trials *trials, const orb_trial *one, int s, int32_t *out);

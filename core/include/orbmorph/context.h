@@ -108,6 +108,10 @@ ORB_API const orb_error *orb_context_error(const orb_context *ctx);
  * the result is NULL and the error ORB_E_NO_MEMORY. A count of 0 gives a valid block. Any thread. */
 ORB_API void *orb_alloc(orb_context *ctx, size_t count, size_t size);
 ORB_API void orb_free(orb_context *ctx, void *block); /* NULL is fine */
+/* Counts memory in the budget that the caller holds by other means, such as a file in memory: ORB_OK or
+ * ORB_E_NO_MEMORY. The caller discharges it before it destroys the context. Any thread. */
+ORB_API ORB_MUST_CHECK orb_status orb_memory_charge(orb_context *ctx, size_t bytes);
+ORB_API void orb_memory_discharge(orb_context *ctx, size_t bytes);
 ORB_API size_t orb_memory_used(const orb_context *ctx);
 /* The largest use so far, in bytes: a budget for the same work must allow it. */
 ORB_API size_t orb_memory_peak(const orb_context *ctx);
