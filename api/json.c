@@ -12,7 +12,18 @@ typedef struct scanner {
   const unsigned char *at, *end, *begin;
   const char *why;
   size_t values;
+  struct top_names *top; /* of the object that the text is; NULL: not wanted */
 } scanner;
+
+/* Names as the text writes them, with their quotes. */
+typedef struct top_names {
+  int bare; /* the text is the members of the object, without its braces */
+  int count;
+  struct {
+    const unsigned char *at;
+    size_t size;
+  } names[API_JSON_NAMES];
+} top_names;
 
 static int refuse(scanner *s, const char *why) {
   if (!s->why) {
@@ -188,13 +199,34 @@ static int scalar(scanner *s) {
   return *s->at == '-' || (*s->at >= '0' && *s->at <= '9') ? number(s) : refuse(s, "a value is expected");
 }
 
-/* A member's name and colon. */
-static int name(scanner *s) {
+/* Adds a name of the object at the top. */
+static int add_name(scanner *s, const unsigned char *at) {
+  top_names *top = s->top;
+  const size_t size = (size_t)(s->at - at);
+  if (memchr(at, '\\', size)) {
+    return refuse(s, "a name is escaped");
+  }
+  for (int i = 0; i < top->count; i++) {
+    if (top->names[i].size == size && memcmp(top->names[i].at, at, size) == 0) {
+      return refuse(s, "an object has the same name twice");
+    }
+  }
+  if (top->count == API_JSON_NAMES) {
+    return refuse(s, "an object has too many names");
+  }
+  top->names[top->count].at = at;
+  top->names[top->count++].size = size;
+  return 1;
+}
+
+/* A member's name and colon. depth: how many levels deep. */
+static int name(scanner *s, int depth) {
   blanks(s);
+  const unsigned char *begin = s->at;
   if (s->at >= s->end || *s->at != '"') {
     return refuse(s, "a member's name in quotes is expected");
   }
-  if (!string(s)) {
+  if (!string(s) || (s->top && depth == 1 && !add_name(s, begin))) {
     return 0;
   }
   blanks(s);
@@ -208,17 +240,18 @@ static int name(scanner *s) {
 /* Closes the objects and arrays that end after a value. Returns 1 if another value must follow, 2 at the end of the
  * text, 0 if it refuses. */
 static int after_value(scanner *s, const char *stack, int *depth) {
+  const int least = s->top && s->top->bare;
   while (*depth > 0) {
     blanks(s);
     if (s->at >= s->end) {
-      return refuse(s, "the text ends before the value is complete");
+      return least && *depth == 1 ? 2 : refuse(s, "the text ends before the value is complete");
     }
     char open = stack[*depth - 1];
     if (*s->at == ',') {
       s->at++;
-      return open == '[' || name(s);
+      return open == '[' || name(s, *depth);
     }
-    if (*s->at != (open == '{' ? '}' : ']')) {
+    if (*s->at != (open == '{' ? '}' : ']') || *depth == least) {
       return refuse(s, open == '{' ? "a comma or } is expected" : "a comma or ] is expected");
     }
     s->at++;
@@ -230,6 +263,10 @@ static int after_value(scanner *s, const char *stack, int *depth) {
 static int scan(scanner *s) {
   char stack[API_JSON_DEPTH];
   int depth = 0, more = 1;
+  if (s->top && s->top->bare) {
+    stack[depth++] = '{';
+    more = name(s, depth);
+  }
   while (more == 1) {
     blanks(s);
     if (s->at >= s->end) {
@@ -249,7 +286,7 @@ static int scan(scanner *s) {
         depth--;
       } else if (c == '[') {
         continue;
-      } else if (name(s)) {
+      } else if (name(s, depth)) {
         continue;
       } else {
         return 0;
@@ -270,6 +307,47 @@ size_t api_json_count(const char *bytes, size_t size) {
   const unsigned char *begin = (const unsigned char *)bytes;
   scanner s = {.at = begin, .begin = begin, .end = begin + size};
   return scan(&s) ? s.values : 0;
+}
+
+int api_json_is_object(const char *text, size_t size, int bare, size_t most) {
+  const unsigned char *begin = (const unsigned char *)text;
+  top_names top = {.bare = bare};
+  scanner s = {.at = begin, .begin = begin, .end = begin + size, .top = &top};
+  blanks(&s);
+  return (bare || (s.at < s.end && *s.at == '{')) && scan(&s) && s.values <= most;
+}
+
+const char *api_json_blanks(const char *at) {
+  return at + strspn(at, " \t\r\n");
+}
+
+const char *api_json_after(const char *at) {
+  for (int depth = 0; *at; at++) {
+    if (*at == '"') {
+      for (at++; *at && *at != '"'; at++) {
+        at += *at == '\\' && at[1];
+      }
+    } else if (depth == 0 && strchr(",]} \t\r\n", *at)) {
+      return at;
+    } else {
+      depth += *at == '[' || *at == '{';
+      depth -= *at == ']' || *at == '}';
+    }
+    if (!*at || (depth == 0 && strchr("\"]}", *at))) {
+      return *at ? at + 1 : at;
+    }
+  }
+  return at;
+}
+
+int api_json_next_member(const char **at, api_json_span *name, api_json_span *value) {
+  name->at = api_json_blanks(*at);
+  name->end = api_json_after(name->at);
+  value->at = api_json_blanks(api_json_blanks(name->end) + (*api_json_blanks(name->end) == ':'));
+  value->end = api_json_after(value->at);
+  *at = api_json_blanks(value->end);
+  *at += **at == ',';
+  return *name->at == '"' && value->end > value->at;
 }
 
 static int by_name(const void *a, const void *b) {

@@ -265,7 +265,7 @@ static int get_count(const cJSON *object, const char *name, int64_t *out) {
   return fine;
 }
 
-int api_mesh_summary_of(const cJSON *object, api_mesh_summary *out) {
+static int read_summary(const cJSON *object, api_mesh_summary *out) {
   return get_text(object, "name", out->name, sizeof out->name) &&
          get_text(object, "format", out->format, sizeof out->format) &&
          get_text(object, "repair", out->repair, sizeof out->repair) && get_count(object, "vertices", &out->vertices) &&
@@ -273,9 +273,24 @@ int api_mesh_summary_of(const cJSON *object, api_mesh_summary *out) {
          get_count(object, "file_triangles", &out->file_triangles);
 }
 
+/* A description may list loops of half a million values, so only its short members are read. */
 int api_mesh_summarise(const char *json, api_mesh_summary *out) {
-  cJSON *object = cJSON_Parse(json);
-  int fine = api_mesh_summary_of(object, out);
+  enum { SHORT = 6 * ORB_NAME_MAX + API_REPAIR_TEXT };
+  const char *at = api_json_blanks(json);
+  api_json_span name, value;
+  api_text few = {0};
+  api_json_open(&few, '{');
+  for (at += *at == '{'; api_json_next_member(&at, &name, &value);) {
+    if (value.end - value.at <= SHORT &&
+        (*value.at == '"' || *value.at == '-' || (*value.at >= '0' && *value.at <= '9'))) {
+      api_text_append(&few, few.size > 1 ? "," : "", few.size > 1);
+      api_text_append(&few, name.at, (size_t)(value.end - name.at));
+    }
+  }
+  api_json_close(&few, '}');
+  cJSON *object = few.failed ? NULL : cJSON_Parse(few.data);
+  int fine = object && read_summary(object, out);
   cJSON_Delete(object);
+  api_text_free(&few);
   return fine;
 }

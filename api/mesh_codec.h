@@ -51,6 +51,5 @@ typedef struct api_mesh_summary {
 } api_mesh_summary;
 /* Returns 1, or 0 if the text does not decode. */
 int api_mesh_summarise(const char *json, api_mesh_summary *out);
-int api_mesh_summary_of(const cJSON *description, api_mesh_summary *out);
 
 #endif

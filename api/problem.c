@@ -2,7 +2,10 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+#include "api/json.h"
 
 static const struct entry {
   const char *name;
@@ -223,6 +226,88 @@ void api_problem_of_error(const orb_error *error, api_problem *problem) {
   if (error->element_count > 0) {
     elements(error, out);
   }
+}
+
+/* The elements of an array, one after the other, from the bracket that opens it. 0: it has no more. */
+static int next_element(const char **at, api_json_span *out) {
+  out->at = api_json_blanks(*at + (**at == '[' || **at == ','));
+  out->end = api_json_after(out->at);
+  *at = api_json_blanks(out->end);
+  return out->end > out->at;
+}
+
+static int is_name(api_json_span name, const char *wanted) {
+  const size_t size = strlen(wanted);
+  return name.end == name.at + size + 2 && memcmp(name.at + 1, wanted, size) == 0;
+}
+
+static void append(api_text *out, api_json_span text) {
+  if (out->size && !strchr("[{:", out->data[out->size - 1])) {
+    api_text_append(out, ",", 1);
+  }
+  api_text_append(out, text.at, (size_t)(text.end - text.at));
+}
+
+/* Appends the first loops and their lengths, of at most `most` bytes; returns how many. */
+static int append_loops(api_json_span loops, api_json_span lengths, size_t most, api_text *out) {
+  api_text kept = {0};
+  int count = 0;
+  api_json_span loop, length;
+  api_json_key(out, "loops");
+  api_json_open(out, '[');
+  api_json_key(&kept, "loop_lengths_relative");
+  api_json_open(&kept, '[');
+  while (next_element(&loops.at, &loop) && next_element(&lengths.at, &length)) {
+    const size_t bytes = (size_t)(loop.end - loop.at + length.end - length.at) + 2;
+    if (bytes > most) {
+      break;
+    }
+    most -= bytes;
+    append(out, loop);
+    append(&kept, length);
+    count++;
+  }
+  api_json_close(out, ']');
+  api_json_close(&kept, ']');
+  append(out, (api_json_span){kept.data, kept.data + kept.size});
+  out->failed |= kept.failed;
+  api_text_free(&kept);
+  return count;
+}
+
+/* Values would take thirty times the bytes of the text, so it is taken apart as it is. */
+void api_problem_shorten(api_problem *problem, size_t most) {
+  api_json_span name, value, loops = {0}, lengths = {0};
+  double genus = 0;
+  api_text out = {0};
+  if (problem->facts.size <= most) {
+    return;
+  }
+  for (const char *at = problem->facts.data; api_json_next_member(&at, &name, &value);) {
+    if (is_name(name, "loops")) {
+      loops = value;
+    } else if (is_name(name, "loop_lengths_relative")) {
+      lengths = value;
+    } else if (!is_name(name, "loops_left_out")) {
+      genus = is_name(name, "genus") ? strtod(value.at, NULL) : genus;
+      append(&out, (api_json_span){name.at, value.end});
+    }
+  }
+  if (!loops.at) {
+    api_text_free(&out);
+    return;
+  }
+  if (lengths.at && *loops.at == '[' && *lengths.at == '[') {
+    const double left_out = genus - append_loops(loops, lengths, most, &out);
+    if (left_out > 0) {
+      api_json_member_number(&out, "loops_left_out", left_out);
+    }
+  } else {
+    out.failed = 1;
+  }
+  out.failed |= problem->facts.failed;
+  api_text_free(&problem->facts);
+  problem->facts = out;
 }
 
 void api_problem_write(const api_problem *problem, api_text *out) {

@@ -23,6 +23,11 @@ int api_refuse(api_problem *problem, const char *name, const char *format, ...) 
 /* Fills *problem from an error of the library, with its facts. */
 void api_problem_of_error(const orb_error *error, api_problem *problem);
 
+/* Leaves out the last loops of a refusal for handles, so that those that stay take at most `most` bytes; loops_left_out
+ * counts them. Facts of at most `most` bytes stay as they are; others must be valid JSON. Without memory facts.failed
+ * is set. */
+void api_problem_shorten(api_problem *problem, size_t most);
+
 /* Appends the document. */
 void api_problem_write(const api_problem *problem, api_text *out);
 

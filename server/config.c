@@ -70,9 +70,12 @@ static const entry table[] = {
     {"max-json", NUMBER(max_json, 1024, 1 << 26), "1M", "limit on the bytes of a JSON body"},
     {"max-ratio", NUMBER(max_ratio, 2, 1000000), "200",
      "limit on the compression ratio of a body that decompresses to more than 1M"},
-    {"encoded-bytes", NUMBER(encoded_bytes, 0, INT64_C(1) << 40), "128M",
+    {"request-memory", NUMBER(request_memory, 1 << 20, INT64_C(1) << 40), "64M",
+     "bytes that JSON bodies, decompression and answers of all requests may hold at once, at least half as much again "
+     "as each of the next two"},
+    {"encoded-bytes", NUMBER(encoded_bytes, 0, INT64_C(1) << 40), "32M",
      "bytes of compressed answers and small assets to keep in memory; 0: none, and answers are not compressed"},
-    {"decode-memory", NUMBER(decode_memory, 1 << 20, INT64_C(1) << 40), "256M",
+    {"decode-memory", NUMBER(decode_memory, 1 << 20, INT64_C(1) << 40), "32M",
      "bytes for decompressing all bodies at once"},
     {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "limit on the triangles of a mesh"},
     {"queue-limit", NUMBER(queue_limit, 1, 1000000), "10000", "limit on unfinished jobs"},
@@ -88,8 +91,8 @@ static const entry table[] = {
     {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
      "bytes of embeddings, alignments and supermeshes to keep, most recently used ones first; 0: all"},
     {"quota-derived", NUMBER(quota_derived, 0, INT64_C(1) << 50), "0",
-     "bytes of embeddings, alignments and supermeshes that each tenant may keep, unless its token says otherwise; 0: "
-     "any"},
+     "bytes of embeddings, alignments, supermeshes and requests of unfinished jobs that each tenant may keep, unless "
+     "its token says otherwise; 0: any"},
     {"keep-jobs", NUMBER(keep_jobs, 0, INT64_C(1) << 40), "100000",
      "ended jobs to keep in the catalogue, newest first; 0: all"},
     {"lost-days", NUMBER(lost_days, 0, 36500), "30",
@@ -282,6 +285,8 @@ static void print_help(void) {
       "  orbmorphd webhook secret [--tenant NAME]\n"
       "                                 manage the webhooks that announce the ends of jobs; secret: print the secret\n"
       "                                 of webhooks that requests name\n"
+      "  orbmorphd crash list | crash clear NAME\n"
+      "                                 list the work whose processes died; clear allows it again\n"
       "  orbmorphd --version, --help\n\n"
       "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file. A flag overrides the\n"
       "environment, which overrides the file, which overrides the default in brackets.\n");

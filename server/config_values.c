@@ -187,6 +187,9 @@ int config_is_consistent(config *out) {
   if (out->job_memory == 0) {
     out->job_memory = (int64_t)sysconf(_SC_PHYS_PAGES) / 2 * sysconf(_SC_PAGESIZE);
   }
+  const int64_t parts = out->decode_memory > out->encoded_bytes ? out->decode_memory : out->encoded_bytes;
+  const int64_t least = parts + parts / 2; /* one owner gets two thirds (http/held.h) */
+  out->request_memory = least > out->request_memory ? least : out->request_memory;
   if ((out->tls_certificate[0] == 0) != (out->tls_key[0] == 0)) {
     config_complain("tls-certificate and tls-key must both be set, or neither");
     return 0;

@@ -29,7 +29,7 @@ typedef struct config {
   char metrics_listen[256]; /* as listen; of the role work; "": no port */
   int64_t workers, worker_nice, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
-  int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
+  int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, request_memory, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, check_seconds, disk_reserve, drain_seconds, derived_bytes, quota_derived, keep_jobs;
   int64_t cache_bytes, lost_days, scrub_rate, scrub_seconds;
   int64_t webhook_retry_seconds, fetch_seconds, lease_seconds;
@@ -40,8 +40,8 @@ void config_complain(const char *format, ...) API_PRINTF(1, 2);
 /* From now on the daemon runs, and config_complain() writes to the log. Only the main thread calls both. */
 void config_complains_in_log(void);
 
-/* Replaces 0 workers and 0 job-memory by what suits the machine, and checks all values that are not plain numbers. 0: a
- * value is not valid, and config_complain() has said which. */
+/* Replaces 0 workers and 0 job-memory by what suits the machine, makes request-memory at least as large as its parts,
+ * and checks all values that are not plain numbers. 0: a value is not valid, and config_complain() has said which. */
 int config_is_consistent(config *out);
 
 /* The URL of the catalogue; NULL: it is in the data folder. */

@@ -60,7 +60,7 @@ static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out,
     got = isolate_receive(p, CHANNEL_ANSWER_MOST, &f);
   }
   if (got != CHANNEL_OK) {
-    *breach = got == CHANNEL_BAD ? ISOLATE_NO_FRAME : NULL;
+    *breach = isolate_breach(p, got);
     return -1;
   }
   int fine = f.type == FRAME_DONE && task_read_done(&f, &done, &json, problem);
@@ -75,11 +75,11 @@ static int take(isolated *p, objects *store, orb_context *ctx, object_temp *out,
 
 /* The process died, or was ended for a breach. */
 static int refuse_dead(catalogue *cat, const char *id, const char *tenant, const task_head *task, const char *breach,
-                       int status, api_problem *problem) {
+                       int status, int alone, api_problem *problem) {
   char why[100];
   isolate_end_text(breach, status, why, sizeof why);
   log_error("the process that converted the asset of supermesh %s %s", id, why);
-  if (isolate_end_counts(breach, status)) {
+  if (isolate_end_counts(breach, status, alone)) {
     catalogue_crash_of(cat, task->key, id, tenant, (int64_t)time(NULL) * 1000);
   }
   return api_refuse(problem, "job-crashed",
@@ -93,13 +93,14 @@ static int convert_isolated(catalogue *cat, objects *store, orb_context *ctx, co
   const char *breach = NULL;
   const struct iovec part = {(void *)(uintptr_t)task, sizeof *task};
   if (!isolate_open(&process, ctx)) {
-    return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
+    return task_refuse_open(&process, problem);
   }
   process.wanted = limits->wanted;
   process.user = limits->user;
   int result = isolate_send(&process, FRAME_TASK, &part, 1, asset) == CHANNEL_OK
                    ? take(&process, store, ctx, out, &breach, problem)
                    : -1;
+  const int alone = isolate_is_alone(&process);
   int status = isolate_close(&process);
   if (result >= 0) {
     return result;
@@ -108,7 +109,7 @@ static int convert_isolated(catalogue *cat, objects *store, orb_context *ctx, co
     api_problem_of_error(orb_context_error(ctx), problem);
     return 0;
   }
-  return refuse_dead(cat, id, tenant, task, breach, status, problem);
+  return refuse_dead(cat, id, tenant, task, breach, status, alone, problem);
 }
 
 int convert_asset(catalogue *cat, objects *store, orb_context *ctx, const char *id, orb_profile profile, int asset,

@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 #include <sodium.h>
+#include <string.h>
 
 static unsigned char key[crypto_shorthash_KEYBYTES];
 _Static_assert(crypto_shorthash_BYTES == sizeof(uint64_t), "SipHash-2-4 has 64 bits");
@@ -16,4 +17,8 @@ uint64_t keyed_hash(const void *bytes, size_t size) {
   pthread_once(&once, make_key);
   crypto_shorthash((unsigned char *)&hash, bytes, size, key);
   return hash;
+}
+
+uint64_t tenant_hash(const char *tenant) {
+  return keyed_hash(tenant, strlen(tenant)) | HASH_OF_OWNER;
 }

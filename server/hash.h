@@ -8,5 +8,10 @@
 
 /* Any thread. */
 uint64_t keyed_hash(const void *bytes, size_t size);
+/* Of the numbers of owners, where what each may hold is counted: so none is a small number with a meaning of its own.
+ */
+static const uint64_t HASH_OF_OWNER = UINT64_C(1) << 63;
+/* The number of a tenant. */
+uint64_t tenant_hash(const char *tenant);
 
 #endif

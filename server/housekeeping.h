@@ -4,6 +4,7 @@
 #define ORB_HOUSEKEEPING_H
 
 #include "http/http.h"
+#include "trim.h"
 
 /* Ended jobs in the catalogue. */
 typedef struct ended_jobs {
@@ -16,6 +17,7 @@ typedef struct housekeeping {
   int64_t seen; /* results made by the last round of eviction */
   int over;     /* that round could not evict enough */
   ended_jobs jobs;
+  trim_state trimmed;
 } housekeeping;
 
 #define HOUSEKEEPING_START ((housekeeping){.seen = -1})

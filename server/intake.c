@@ -109,11 +109,8 @@ int intake_check_here(const task_head *task, const unsigned char *sent, int fd, 
 /* Whether a description is valid JSON and agrees with what the daemon knows. Jobs of all owners read the mesh by it. */
 static int is_of(const task_head *task, const char *text) {
   api_mesh_summary summary;
-  cJSON *description = task_json(text);
-  int fine = api_mesh_summary_of(description, &summary) && strcmp(summary.repair, task->repair) == 0 &&
-             (task->format == ORB_FORMAT_AUTO || strcmp(summary.format, orb_format_name(task->format)) == 0);
-  cJSON_Delete(description);
-  return fine;
+  return task_is_object(text) && api_mesh_summarise(text, &summary) && strcmp(summary.repair, task->repair) == 0 &&
+         (task->format == ORB_FORMAT_AUTO || strcmp(summary.format, orb_format_name(task->format)) == 0);
 }
 
 /* What a process gets: the bytes, or a descriptor of the file. */
@@ -126,6 +123,7 @@ typedef struct given_file {
 typedef struct check_end {
   int status;         /* as of isolate_close() */
   const char *breach; /* NULL: it died or was stopped */
+  int alone;          /* no other process had work meanwhile */
 } check_end;
 
 /* 1 with the description, 0 with the problem, −1: the process died or was stopped, or broke the protocol. */
@@ -137,18 +135,17 @@ static int ask(isolated *process, const task_head *task, given_file file, api_te
   done_head done;
   char *text = NULL;
   *breach = NULL;
-  if (isolate_send(process, FRAME_TASK, parts, 2, file.fd) != CHANNEL_OK) {
-    return -1;
-  }
-  const channel_result got = isolate_receive(process, CHANNEL_ANSWER_MOST, &f);
+  channel_result got = isolate_send(process, FRAME_TASK, parts, 2, file.fd);
+  got = got == CHANNEL_OK ? isolate_receive(process, CHANNEL_ANSWER_MOST, &f) : got;
   if (got != CHANNEL_OK) {
-    *breach = got == CHANNEL_BAD ? ISOLATE_NO_FRAME : NULL;
+    *breach = isolate_breach(process, got);
     return -1;
   }
   int fine =
       f.type == FRAME_DONE && task_read_done(&f, &done, &text, problem) && (!done.fine || (text && is_of(task, text)));
   frame_free(&f);
   *breach = fine ? NULL : "an answer that does not fit the check";
+  process->unconfined = fine && done.lacks && isolate_is_strict();
   if (fine && done.fine) {
     api_text_add(json, text);
     fine = !json->failed;
@@ -172,14 +169,15 @@ static int ask_one(const task_head *task, given_file file, const char *tenant, o
     head.inputs = READER_BYTES;
     head.cpu_seconds += READER_WORK_MS / 1000;
   } else if (!isolate_open(&own, ctx)) {
-    return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
+    return task_refuse_open(&own, problem);
   }
   process->wanted = limits->wanted;
   process->user = limits->user;
   int result = ask(process, &head, file, json, &end->breach, problem);
-  if (r && result >= 0) {
+  if (r && result >= 0 && !process->unconfined) {
     reader_give(r);
   } else {
+    end->alone = isolate_is_alone(process);
     end->status = r ? reader_end(r) : isolate_close(&own);
   }
   return result;
@@ -224,7 +222,7 @@ static int check_isolated(const intake_file *file, const task_head *task, const 
     return 0;
   }
   isolate_end_text(end.breach, end.status, why, sizeof why);
-  *died = isolate_end_counts(end.breach, end.status);
+  *died = isolate_end_counts(end.breach, end.status, end.alone);
   log_error("the process that checked mesh %s %s", file->id, why);
   return api_refuse(problem, "job-crashed",
                     "The process that read the file died. Please report this as a bug, with the file.");

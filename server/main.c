@@ -114,21 +114,24 @@ static void on_change(const char *name, int taken) {
 /* Executes a command from the control socket. */
 static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
-  char what[8] = "", verb[8] = "", name[64] = "";
-  sscanf(line, "%7s %7s %63s", what, verb, name);
+  char what[8] = "", verb[8] = "", name[64] = "", tenant[64] = "";
+  sscanf(line, "%7s %7s %63s %*s %*s %*s %63s", what, verb, name, tenant);
   const admin_kind *kind = admin_kind_named(admin_kinds, what);
-  int lists = strcmp(verb, "list") == 0 || strcmp(verb, "secret") == 0;
+  const int lists = strcmp(verb, "list") == 0, shows = strcmp(verb, "secret") == 0;
   if (!kind) {
     api_text_add(reply, "unknown command\n");
     return 2;
   }
-  if (kind == &admin_key && lists) {
+  if (kind == &admin_key && (lists || shows)) {
     signers_store_use(srv->signers);
   }
   int status = kind->apply(srv->cat, line, reply);
-  if (status == 0 && !lists) {
+  if (status == 0 && !lists && !shows) {
     status = !parts_reload_callers(srv);
-    log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s", kind->name, verb, name);
+  }
+  if (!lists) {
+    const char *whose = strcmp(name, "-") == 0 ? tenant : name; /* the secret of webhooks is a tenant's */
+    log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s%s", kind->name, verb, whose, status ? ", failed" : "");
   }
   return status;
 }
@@ -187,6 +190,7 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
       housekeeping_budget(srv, &done);
       signers_store_use(srv->signers);
       housekeeping_jobs(srv, &done);
+      trim_when_free(&done.trimmed);
     }
     if (ready > 0 && wait[1].revents) {
       control_serve(srv->control, on_command, srv);

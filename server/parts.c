@@ -12,7 +12,7 @@
 #include "store/place.h"
 #include "trace/send.h"
 
-enum { CACHE_BYTES = 64 << 20 };
+enum { CACHE_BYTES = 8 << 20 };
 
 static int has_role(const config *options, const char *role) {
   return strcmp(options->role, role) == 0;
@@ -107,6 +107,7 @@ int parts_start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   srv->memory = budget_create(o->job_memory);
+  srv->arriving = temporary_create();
   const queue_sharing sharing = {.url = o->catalogue,
                                  .data = o->data,
                                  .works = !has_role(o, "serve"),
@@ -126,6 +127,7 @@ int parts_start(server *srv, worker_pool **workers) {
                            .fetch = {.authorities = o->tls_authorities,
                                      .check_ms = 1000 * o->check_seconds,
                                      .memory = srv->memory,
+                                     .arriving = srv->arriving,
                                      .max_triangles = o->max_triangles,
                                      .total_ms = 1000 * o->fetch_seconds,
                                      .most = o->max_body,
@@ -143,7 +145,7 @@ int parts_start(server *srv, worker_pool **workers) {
   const char *where = srv->works_only ? o->metrics_listen : o->listen;
   int listens = !where[0] || listen_open(o, where, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  return listens && srv->memory && open_stores(srv) && check_catalogue(srv) &&
+  return listens && srv->memory && srv->arriving && open_stores(srv) && check_catalogue(srv) &&
          (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->q = queue_create(&queued, srv->cat)) &&
          queue_recover(srv->q, isolate_is_on()) == STORE_OK && heals(srv) &&
@@ -181,6 +183,7 @@ void parts_stop(server *srv, worker_pool *workers) {
   tasks_free(srv->checks);
   tasks_free(srv->large_checks);
   budget_destroy(srv->memory);
+  temporary_destroy(srv->arriving);
   catalogue_close(srv->cat);
   objects_close(srv->store);
   cache_destroy(srv->descriptions);

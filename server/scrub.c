@@ -125,10 +125,13 @@ static void look_for_row(void *user, object_kind kind, const char *id, uint64_t 
 static void check_catalogue(scrub *s) {
   char why[512];
   s->now.catalogue_damaged = !catalogue_quick_check(s->cat, why, sizeof why);
-  if (s->now.catalogue_damaged) {
+  if (s->now.catalogue_damaged && !s->last.catalogue_damaged) {
     why[strcspn(why, "\n")] = 0;
-    log_error("scrub: the catalogue is damaged: %s. Restore a backup; /readyz answers 503 until then", why);
+    log_error("scrub: the catalogue is damaged: %s. Stop the daemon and restore a backup", why);
   }
+  pthread_mutex_lock(&s->lock);
+  s->last.catalogue_damaged = s->now.catalogue_damaged; /* told at once, after the log */
+  pthread_mutex_unlock(&s->lock);
 }
 
 static void finish_round(scrub *s) {
@@ -156,6 +159,9 @@ static void *run(void *argument) {
     s->now = (scrub_report){.rounds = s->last.rounds, .bytes = s->last.bytes};
     s->named = 0;
     began = orb_clock_ms();
+    if (s->last.rounds > 0) { /* the daemon has checked it before it started the scrub */
+      check_catalogue(s);     /* first: reading all objects may take days */
+    }
     if (!objects_backup_runs(s->store)) { /* else deleted objects are still there */
       objects_each(s->store, look_for_row, s);
     }
@@ -163,7 +169,6 @@ static void *run(void *argument) {
       verify_rows(s, (resource_kind)kind);
     }
     if (!is_stopping(s)) {
-      check_catalogue(s);
       finish_round(s);
     }
   }

@@ -16,7 +16,7 @@ typedef struct scrub_report {
   int64_t missing;       /* a row names them, and they do not exist or were moved to quarantine */
   int64_t unreadable;    /* input/output errors */
   int64_t without_row;   /* objects that no row names */
-  int catalogue_damaged; /* PRAGMA quick_check found damage */
+  int catalogue_damaged; /* PRAGMA quick_check found damage when it was last run, at the beginning of a round */
 } scrub_report;
 
 typedef struct scrub scrub;

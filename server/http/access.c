@@ -8,6 +8,7 @@
 
 #include "http/http.h"
 #include "log.h"
+#include "store/owners.h"
 
 static caller *find_caller(const server *srv, const char *header) {
   unsigned char hash[TOKEN_BYTES];
@@ -152,6 +153,26 @@ int access_has_room(const request *r, int64_t bytes, api_problem *problem) {
   return 0;
 }
 
+int64_t access_largest(const request *r) {
+  int64_t used = r->caller ? __atomic_load_n(&r->caller->row.used, __ATOMIC_RELAXED) : 0;
+  int64_t quota = r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0;
+  return owner_largest_file(quota, used);
+}
+
+int access_takes_file(const request *r, int64_t bytes, api_problem *problem) {
+  const int64_t largest = access_largest(r);
+  if (largest == 0 || bytes <= largest) {
+    return 1;
+  }
+  int64_t quota = __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED);
+  api_refuse(problem, "quota-exceeded",
+             "The token \"%s\" may store %lld bytes of meshes, and this file has more: decimate the mesh, or ask the "
+             "operator for a larger quota.",
+             r->caller->row.name, (long long)quota);
+  api_json_member_integer(&problem->facts, "quota", quota);
+  return 0;
+}
+
 int access_priority(const request *r) {
   int class = r->caller ? __atomic_load_n(&r->caller->row.priority, __ATOMIC_RELAXED) : 0;
   return QUEUE_URGENCIES * class + QUEUE_URGENCIES - 1 - parse_urgency(header_of(r, "Priority"));
@@ -187,8 +208,12 @@ void access_audit(const request *r, const struct sockaddr *address) {
   request_fields(r, fields);
   size_t n = strlen(fields);
   snprintf(fields + n, sizeof fields - n,
-           ",\"audit\":\"%s\",\"token\":\"%s\",\"tenant\":\"%s\",\"address\":\"%s\",\"id\":\"%s\",\"status\":%u", what,
-           r->caller ? r->caller->row.name : "", r->caller ? r->caller->row.tenant : "", host,
-           r->status < 400 ? r->id : "", r->status); /* the id of a refused request has not been checked */
+           ",\"audit\":\"%s\",\"token\":\"%s\",\"key\":\"%s\",\"tenant\":\"%s\",\"address\":\"%s\",\"id\":\"%s\","
+           "\"status\":%u",
+           what, r->caller ? r->caller->row.name : "", r->signer ? r->signer->row.name : "",
+           r->caller   ? r->caller->row.tenant
+           : r->signer ? r->signer->row.tenant
+                       : "",
+           host, r->id, r->status);
   log_write(strcmp(what, "refused") == 0 ? LOG_WARN : LOG_INFO, fields, "audit");
 }

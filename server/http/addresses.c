@@ -64,6 +64,12 @@ int address_is_local(const struct sockaddr *address) {
   return address->sa_family == AF_UNIX || key[0] == 127;
 }
 
+uint64_t address_hash(const struct sockaddr *address) {
+  unsigned char key[KEY_BYTES];
+  key_of(address, key);
+  return keyed_hash(key, KEY_BYTES);
+}
+
 static unsigned bucket_of(const unsigned char key[KEY_BYTES]) {
   return (unsigned)(keyed_hash(key, KEY_BYTES) % BUCKETS);
 }

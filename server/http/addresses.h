@@ -17,6 +17,8 @@ typedef struct address_entry address_entry;
 addresses *addresses_create(int64_t requests_per_second);
 void addresses_destroy(addresses *a);
 int address_is_local(const struct sockaddr *address); /* loopback, or a Unix socket */
+/* Of the IPv4 address, or the /64 of the IPv6 address. */
+uint64_t address_hash(const struct sockaddr *address);
 /* Counts a connection; NULL out of memory. now: orb_clock_ms(). */
 address_entry *addresses_enter(addresses *a, const struct sockaddr *address, int64_t now);
 void addresses_leave(addresses *a, address_entry *e);

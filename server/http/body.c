@@ -1,6 +1,7 @@
 /* Limits. Both the decoded size and the size on the wire count against the limit of the route. Beyond the first
  * MEBIBYTE the decoded size may be at most max-ratio times the size on the wire, so that a decompression bomb is
- * refused early. All decoders together may hold decode-memory bytes; a body that would exceed it gets 503.
+ * refused early. All decoders together may hold decode-memory bytes, and bodies and decoders what held.h allows; a body
+ * that would exceed either gets 503.
  *
  * libmicrohttpd accepts a response only before the first byte of a body or after its last one. So the rest of a
  * refused body is read and dropped. After DROP_MOST bytes the refusal is written to the socket directly, past the
@@ -16,6 +17,9 @@
 #include "metrics.h"
 
 enum { MEBIBYTE = 1 << 20, DROP_MOST = 64 << 20 };
+#define BODIES_HELD                                                                                               \
+  "The server holds as many bytes of requests and answers as it may, or this caller its part of them; try again " \
+  "soon, and send less at once."
 
 static int64_t limit_of(const request *r) {
   const config *options = r->srv->options;
@@ -31,7 +35,7 @@ static void refuse_size(request *r) {
   reply_problem(r, &problem);
 }
 
-/* Updates the count of decoder memory; 0 with a refusal if all decoders together hold too much. */
+/* Updates the counts of memory; 0 with a refusal if decoders or requests together hold too much. */
 static int account(request *r) {
   int64_t now = r->decoder ? (int64_t)decoder_memory(r->decoder) : 0, more = now - r->decoder_bytes;
   int64_t all = __atomic_add_fetch(&r->srv->decoding, more, __ATOMIC_RELAXED);
@@ -39,6 +43,10 @@ static int account(request *r) {
   if (more > 0 && all > r->srv->options->decode_memory) {
     reply_refuse(r, "unavailable",
                  "The server is decompressing too many bodies; try again soon, or send the body uncompressed.");
+    return 0;
+  }
+  if (!request_holds(r, &r->body_bytes, now + (int64_t)r->body.capacity)) {
+    reply_refuse(r, "unavailable", BODIES_HELD);
     return 0;
   }
   return 1;
@@ -71,6 +79,7 @@ void body_begin(request *r) {
       return;
     }
     if (!account(r)) {
+      body_free(r);
       return;
     }
   }
@@ -94,7 +103,11 @@ static int take_plain(void *user, const char *bytes, size_t size) {
   } else if (r->route->body == ROUTE_MESH_BODY && !is_fetch(r)) {
     handle_mesh_bytes(r, bytes, size);
   } else {
+    const size_t before = r->body.capacity;
     api_text_append(&r->body, bytes, size);
+    if (r->body.capacity > before) {
+      account(r);
+    }
   }
   return r->response == NULL;
 }
@@ -153,7 +166,7 @@ int body_take(request *r, const char *bytes, size_t size) {
       take_plain(r, bytes, size);
     }
     if (r->response) {
-      objects_abandon(&r->temp);
+      upload_abandon(r);
       body_free(r);
     }
     return 1;
@@ -180,23 +193,8 @@ int body_end(request *r) {
 }
 
 void body_free(request *r) {
-  if (r->decoder) {
-    decoder_free(r->decoder);
-    r->decoder = NULL;
-    account(r);
-  }
+  decoder_free(r->decoder);
+  r->decoder = NULL;
   api_text_free(&r->body);
-}
-
-cJSON *read_json(request *r, api_problem *problem) {
-  api_json_error error;
-  cJSON *body = api_json_parse(r->body.data ? r->body.data : "", r->body.size, &error);
-  if (!body && !error.why) {
-    api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
-  } else if (!body) {
-    api_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu). Correct it there.", error.why,
-               error.offset);
-    api_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
-  }
-  return body;
+  account(r);
 }

@@ -14,7 +14,4 @@ int body_take(request *r, const char *bytes, size_t size);
 int body_end(request *r);
 void body_free(request *r);
 
-/* Parses a JSON body; NULL with the problem. The caller frees it with cJSON_Delete(). */
-cJSON *read_json(request *r, api_problem *problem);
-
 #endif

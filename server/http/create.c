@@ -6,8 +6,8 @@
 #include "api/json.h"
 #include "api/supermesh_codec.h"
 #include "api/webhook_codec.h"
-#include "http/body.h"
 #include "http/http.h"
+#include "http/read_json.h"
 #include "http/room.h"
 #include "log.h"
 #include "store/deliveries.h"
@@ -97,7 +97,7 @@ static int read_wish(request *r, wanted_result *out, api_problem *problem) {
                ? read_embedding(r, body, out, problem)
                : resolve_landmarks(r, body, problem) && wanted_supermesh(r, body, out, problem);
   }
-  cJSON_Delete(body);
+  json_done(body);
   return fine;
 }
 
@@ -157,8 +157,12 @@ static api_job_kind kind_of_job(resource_kind result) {
   return result == RESOURCE_EMBEDDING ? API_JOB_EMBEDDING : result == RESOURCE_MESH ? API_JOB_FETCH : API_JOB_SUPERMESH;
 }
 
-/* A job without room gets that of kept alignments, which the daemon can make again. */
+/* The catalogue holds what jobs ask for, and uploads and results need the rest of the disk: new jobs leave the reserve.
+ * A job without room gets that of kept alignments, which the daemon can make again. */
 static queue_result submit(request *r, queue_request *wanted, room *space, job **j, int *fresh) {
+  const server *srv = r->srv;
+  wanted->is_disk_full =
+      objects_free_bytes(srv->store) < (uint64_t)strlen(wanted->request) + (uint64_t)srv->options->disk_reserve;
   for (;;) {
     store_result measured = wanted->kind == API_JOB_FETCH ? STORE_OK : room_measure(r, space);
     if (measured != STORE_OK) {
@@ -166,7 +170,7 @@ static queue_result submit(request *r, queue_request *wanted, room *space, job *
     }
     wanted->room = space->quota > 0 ? &space->left : NULL;
     queue_result result = queue_submit(r->srv->q, wanted, j, fresh);
-    if (result != QUEUE_ROOM || !room_make(r, queue_bytes_of(wanted->cost) - space->left)) {
+    if (result != QUEUE_ROOM || !room_make(r, queue_needs_of(wanted) - space->left)) {
       return result;
     }
   }
@@ -195,7 +199,7 @@ void submit_wanted(request *r, const wanted_result *wish) {
   room space = {0};
   queue_result result = submit(r, &wanted_job, &space, &j, &fresh);
   if (result == QUEUE_ROOM) {
-    room_refuse(r, &space);
+    room_refuse(r, &space, queue_needs_of(&wanted_job));
     return;
   }
   if (result != QUEUE_OK) {

@@ -18,22 +18,15 @@ typedef struct item {
   encoded_cache *of;
   struct item *next_hash, *newer, *older;
   int refs;
+  int64_t counted; /* bytes of the budget */
 } item;
 
 struct encoded_cache {
   pthread_mutex_t lock;
   size_t max_bytes, bytes;
+  held *budget;
   item *buckets[BUCKETS], *newest, *oldest;
 };
-
-encoded_cache *encoded_open(size_t max_bytes) {
-  encoded_cache *c = calloc(1, sizeof *c);
-  if (c) {
-    pthread_mutex_init(&c->lock, NULL);
-    c->max_bytes = max_bytes;
-  }
-  return c;
-}
 
 static item **bucket(encoded_cache *c, const char *tag, coding which) {
   return &c->buckets[(keyed_hash(tag, strlen(tag)) + (uint64_t)which) % BUCKETS];
@@ -44,6 +37,7 @@ static void unref(item *it) {
     if (!region_free(it->entry.bytes)) {
       free(it->entry.bytes);
     }
+    held_give(it->of->budget, HELD_KEPT, it->counted);
     free(it);
   }
 }
@@ -69,6 +63,30 @@ static void drop(encoded_cache *c, item *it) {
   unlink_order(c, it);
   c->bytes -= it->entry.size + OVERHEAD;
   unref(it);
+}
+
+/* Drops the least recently sent answers. What is being sent is freed after that. */
+static void give_way(void *user, int64_t bytes) {
+  encoded_cache *c = user;
+  pthread_mutex_lock(&c->lock);
+  while (bytes > 0 && c->oldest) {
+    bytes -= c->oldest->refs == 1 ? c->oldest->counted : 0;
+    drop(c, c->oldest);
+  }
+  pthread_mutex_unlock(&c->lock);
+}
+
+encoded_cache *encoded_open(size_t max_bytes, held *budget) {
+  encoded_cache *c = calloc(1, sizeof *c);
+  if (c) {
+    pthread_mutex_init(&c->lock, NULL);
+    c->max_bytes = max_bytes;
+    c->budget = budget;
+  }
+  if (c && budget) {
+    held_on_lack(budget, give_way, c);
+  }
+  return c;
 }
 
 static item *find(encoded_cache *c, const char *tag, coding which) {
@@ -118,8 +136,13 @@ const encoded *encoded_make(encoded_cache *c, const char *tag, coding which, con
   if (found) {
     return found;
   }
+  const int64_t most = bytes ? (int64_t)size : 0; /* compressed it has fewer */
+  if (!held_take(c->budget, HELD_KEPT, most)) {
+    return NULL;
+  }
   item *it = calloc(1, sizeof *it);
   if (!it) {
+    held_give(c->budget, HELD_KEPT, most);
     return NULL;
   }
   if (bytes) {
@@ -128,6 +151,8 @@ const encoded *encoded_make(encoded_cache *c, const char *tag, coding which, con
   if (!it->entry.bytes) {
     it->entry.size = 0;
   }
+  it->counted = (int64_t)it->entry.size;
+  held_give(c->budget, HELD_KEPT, most - it->counted);
   snprintf(it->tag, sizeof it->tag, "%s", tag);
   it->which = which;
   it->of = c;

@@ -6,6 +6,7 @@
 #define ORB_HTTP_ENCODED_H
 
 #include "http/encode.h"
+#include "http/held.h"
 
 typedef struct encoded_cache encoded_cache;
 typedef struct encoded {
@@ -13,11 +14,13 @@ typedef struct encoded {
   size_t size;
 } encoded;
 
-encoded_cache *encoded_open(size_t max_bytes); /* NULL: out of memory */
-void encoded_close(encoded_cache *c);          /* all references must have been released */
+/* budget: counts their bytes as long as a caller or the cache has them, and lets the cache give way; NULL: none. NULL:
+ * out of memory. */
+encoded_cache *encoded_open(size_t max_bytes, held *budget);
+void encoded_close(encoded_cache *c); /* all references must have been released */
 /* Adds a reference; NULL: not there. */
 const encoded *encoded_find(encoded_cache *c, const char *tag, coding which);
-/* Compresses what is not there yet, or copies it for CODING_NONE, and adds a reference; NULL: out of memory. bytes
+/* Compresses what is not there yet, or copies it for CODING_NONE, and adds a reference; NULL: no memory. bytes
  * NULL: remembers that this answer is not kept. */
 const encoded *encoded_make(encoded_cache *c, const char *tag, coding which, const void *bytes, size_t size);
 void encoded_release(const encoded *e); /* NULL: nothing */

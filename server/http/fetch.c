@@ -2,8 +2,8 @@
 #include <string.h>
 
 #include "api/fetch_codec.h"
-#include "http/body.h"
 #include "http/http.h"
+#include "http/read_json.h"
 
 /* The name, format and repair of a download are members of its body. */
 static int check_query(request *r, api_problem *problem) {
@@ -26,7 +26,7 @@ static void fetch_away(request *r) {
   cJSON *body = check_query(r, &problem) ? read_json(r, &problem) : NULL;
   int fine = body && read_webhook(r, body, &wanted, &problem) && api_fetch_request_read(body, &wish, &problem) &&
              check_url("\"url\"", wish.url, &r->srv->fetch_allowed, &url, &problem);
-  cJSON_Delete(body);
+  json_done(body);
   if (fine) {
     strcpy(wish.url, url.text);
     wish.quota = r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0;

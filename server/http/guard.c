@@ -7,13 +7,33 @@
 #include "http/http.h"
 
 typedef struct seen {
-  int hosts, lengths, encodings, codings, bad_name, bad_length, bad_encoding;
+  int hosts, lengths, encodings, codings, bad_name, bad_value, bad_length, bad_encoding;
   const char *length;
+  const char *head, *head_end; /* the lines of the request, up to its body */
+  const char *value_end;       /* where the last value ends; NULL: not known */
 } seen;
+
+/* Of CR and LF, which libmicrohttpd overwrites with zeros. */
+enum { LINE_END = 2 };
+
+/* The next line begins here. A value ends for libmicrohttpd at its first NUL: then more bytes follow than the end of a
+ * line has. A NUL before a bare line feed looks like CR and LF. */
+static void look_between(seen *s, const char *next, int line_ends) {
+  s->bad_value |= s->value_end && next - s->value_end > line_ends * LINE_END;
+}
+
+static int is_in_head(const seen *s, const char *at) {
+  return at && at >= s->head && at < s->head_end;
+}
 
 static enum MHD_Result look(void *user, enum MHD_ValueKind kind, const char *name, const char *value) {
   seen *s = user;
   (void)kind;
+  const int is_whole = is_in_head(s, name); /* else the header is folded: its name was copied, and got the next line */
+  if (is_whole) {
+    look_between(s, name, 1);
+  }
+  s->value_end = is_whole && is_in_head(s, value) ? value + strlen(value) : NULL;
   for (const unsigned char *c = (const unsigned char *)name; *c; c++) {
     s->bad_name |= *c <= ' ' || *c == 0x7f;
   }
@@ -69,12 +89,26 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
   return 1;
 }
 
+/* The method is the first word of the head, in the memory in which the library took its lines apart. */
+static void look_at_all(const request *r, seen *s) {
+  const union MHD_ConnectionInfo *info =
+      MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+  s->head = r->method;
+  s->head_end = r->method + (info ? info->header_size : 0);
+  MHD_get_connection_values(r->connection, MHD_HEADER_KIND, look, s);
+  look_between(s, s->head_end, 2); /* an empty line follows the last one */
+}
+
 int guard_headers(request *r, const char *version, api_problem *problem) {
   seen s = {0};
-  MHD_get_connection_values(r->connection, MHD_HEADER_KIND, look, &s);
+  look_at_all(r, &s);
   r->has_body = s.encodings || (s.lengths && !s.bad_length && strtoll(s.length, NULL, 10) > 0);
   if (s.bad_name) {
     return bad(problem, "A header name contains a space or control character.");
+  }
+  if (s.bad_value) {
+    r->has_body = 1;
+    return bad(problem, "A header contains a NUL character.");
   }
   if (s.hosts > 1 || (s.hosts == 0 && strcmp(version, "HTTP/1.0") != 0)) {
     return bad(problem, "A request must have exactly one Host header.");

@@ -5,7 +5,8 @@
  *                of api/routes.h to its handler
  *   guard.c, access.c, browser.c, query.c, body.c   what is checked before a handler runs: headers; limits, token,
  *                tenant; foreign pages (hosts.c: names in Host and Origin); query; body
- *   away.c       how a handler leaves the HTTP thread
+ *   away.c       how a handler leaves the HTTP thread          read_json.c   JSON of bodies
+ *   held.c       the memory that requests hold for their callers
  *   request.c    the clock, and a request's fields in the log
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
  *   room.c       room for a new result in the tenant's quota
@@ -51,6 +52,7 @@
 #include "http/callers.h"
 #include "http/decode.h"
 #include "http/encoded.h"
+#include "http/held.h"
 #include "http/listen.h"
 #include "http/parse.h"
 #include "http/signers.h"
@@ -59,6 +61,7 @@
 #include "queue/queue.h"
 #include "scrub.h"
 #include "tasks.h"
+#include "temporary.h"
 
 typedef struct server {
   const config *options;
@@ -67,6 +70,7 @@ typedef struct server {
   queue *q;
   cache *descriptions;
   memory_budget *memory;
+  temporary *arriving;               /* the temporary files of uploads and downloads */
   tasks *io, *checks, *large_checks; /* large uploads have threads of their own and do not delay small ones */
   listener at;
   watch *connections;
@@ -82,6 +86,7 @@ typedef struct server {
   networks webhook_allowed, fetch_allowed; /* besides public addresses */
   callers *callers;
   signers *signers;
+  held *held;
   encoded_cache *encoded;
   int control;           /* the descriptor of the control socket */
   int64_t profiles_made; /* since the start; __atomic */
@@ -128,13 +133,19 @@ struct request {
   request_phase phase;
   int64_t began; /* µs */
 
-  decoder *decoder;                /* NULL: the body is plain */
-  int64_t decoder_bytes;           /* its share of server.decoding */
+  decoder *decoder;      /* NULL: the body is plain */
+  int64_t decoder_bytes; /* its share of server.decoding */
+  held_part body_bytes;  /* of body and decoder, and of the answer's text */
+  held_part answer_bytes;
+  held_part target_bytes;          /* of a long target */
+  uint64_t from;                   /* whose those are: of the address, as no header has arrived before it */
+  uint64_t holder;                 /* whose these are, and takes; 0: not known yet, so the request is refused */
   int64_t wire, received, dropped; /* bytes of the body: as sent, decoded, dropped after a refusal */
   int body_done;                   /* the whole body has arrived */
   api_text body;                   /* JSON */
   api_text refusal;                /* body of a refusal that was made while the request's body arrived */
   object_temp temp;                /* upload */
+  temporary_file takes;            /* what it counts for on the disk */
   api_hash hash;
 
   waiter waiter;
@@ -170,6 +181,10 @@ enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r))
 void request_go_on(request *r, tasks *pool, int64_t memory, void (*fn)(request *r));
 /* Within a task: another thread owns the request from now on, and adds the task again or resumes the connection. */
 void request_handed_over(void);
+
+/* request.c: changes what a part of the request holds, body_bytes or answer_bytes. 0: there is no room for more, and
+ * nothing changes. */
+int request_holds(request *r, held_part *part, int64_t now);
 
 /* guard.c: 1, or 0 with the problem. */
 int guard_headers(request *r, const char *version, api_problem *problem);
@@ -217,6 +232,10 @@ const char *access_view(const request *r);
 int access_sees(const request *r, const char *owner);
 /* 1 if the token's quota has room for an upload; 0 with the problem. */
 int access_has_room(const request *r, int64_t bytes, api_problem *problem);
+/* The most bytes that a file of this caller can have, whether it is known or not; 0: without a quota. */
+int64_t access_largest(const request *r);
+/* 1 if a file may have so many bytes, known or not; 0 with the problem. */
+int access_takes_file(const request *r, int64_t bytes, api_problem *problem);
 
 /* reply.c: each leaves a response. */
 void reply_json(request *r, unsigned status, api_text *json); /* frees json */
@@ -254,6 +273,7 @@ void handle_page(request *r, const char *path);
 /* Handlers. server.c calls them when the whole body has arrived; the two of an upload run while it arrives. */
 void handle_mesh_begin(request *r);
 void handle_mesh_bytes(request *r, const char *bytes, size_t size);
+void upload_abandon(request *r);              /* deletes the temporary file of an upload, if there is one */
 enum MHD_Result handle_mesh_file(request *r); /* when all of it has arrived */
 #define DECLARE(id, method, path, body, scope, query, handler) enum MHD_Result handler(request *r);
 API_ROUTES(DECLARE)

@@ -4,8 +4,8 @@
 
 #include "api/landmark_codec.h"
 #include "api/options.h"
-#include "http/body.h"
 #include "http/http.h"
+#include "http/read_json.h"
 #include "store/owners.h"
 
 /* Reads the body: a `landmarks` array, or an object with that member. */
@@ -15,7 +15,7 @@ static int read_list(request *r, api_landmark_list *out, api_problem *problem) {
   memset(out, 0, sizeof *out);
   int fine = body && (!cJSON_IsObject(body) || api_members_known(body, "the request", known, problem)) &&
              api_landmarks_read(body, 0, out, problem);
-  cJSON_Delete(body);
+  json_done(body);
   if (fine && (out->count == 0 || out->shape_count < 2 || out->shape_count > API_SHAPES_MAX)) {
     return api_refuse(
         problem, "bad-landmarks",
@@ -94,18 +94,17 @@ enum MHD_Result handle_landmarks_create(request *r) {
 /* The array of stored landmarks; NULL with the problem. */
 static cJSON *load(request *r, const char *id, api_problem *problem) {
   store_result result;
-  api_json_error error;
   const cached *entry = find_description(r->srv, RESOURCE_LANDMARKS, id, access_view(r), &result);
   if (!entry && result == STORE_NOT_FOUND) {
     api_refuse(problem, "not-found", "Landmarks %s do not exist: POST them to /v1/landmarks first.", id);
     api_json_member_string(&problem->facts, "landmarks", id);
     return NULL;
   }
-  cJSON *whole = entry ? api_json_parse(entry->row.json, entry->json_size, &error) : NULL;
+  cJSON *whole = entry ? read_json_beside(entry->row.json, entry->json_size, problem) : NULL;
   cJSON *list = cJSON_DetachItemFromObjectCaseSensitive(whole, "landmarks");
   cache_release(r->srv->descriptions, entry);
   cJSON_Delete(whole);
-  if (!list) {
+  if (!list && (!problem->name || strcmp(problem->name, "malformed-json") == 0)) {
     api_refuse(problem, "internal", "The stored landmarks %s cannot be read: DELETE them and POST them again.", id);
   }
   return list;

@@ -6,10 +6,25 @@
 #include "http/http.h"
 #include "intake.h"
 
-enum { LOOK_BYTES = 1 << 20 };
+/* What the caller's unfinished uploads may take of the disk. */
+static temporary_limits limits_of(const request *r) {
+  const server *srv = r->srv;
+  return temporary_limits_of(objects_free_bytes(srv->store), srv->options->disk_reserve, access_largest(r));
+}
 
-static void refuse_full(request *r) {
-  reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
+static void refuse_room(request *r, temporary_room room) {
+  if (room == TEMPORARY_OTHERS) {
+    reply_refuse(r, "unavailable",
+                 "Your unfinished uploads hold as many bytes of the server's disk as they may. Send fewer at once, and "
+                 "try again when one has ended.");
+  } else {
+    reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
+  }
+}
+
+void upload_abandon(request *r) {
+  objects_abandon(&r->temp);
+  temporary_give(r->srv->arriving, &r->takes);
 }
 
 static int read_upload(const request *r, api_upload *out, api_problem *problem) {
@@ -21,6 +36,12 @@ static int read_upload(const request *r, api_upload *out, api_problem *problem) 
   return api_upload_read(&query, out, problem);
 }
 
+static int64_t announced_bytes(const request *r) {
+  const char *length = header_of(r, "Content-Length");
+  const unsigned long long bytes = length ? strtoull(length, NULL, 10) : 0;
+  return bytes < INT64_MAX / 2 ? (int64_t)bytes : INT64_MAX / 2;
+}
+
 void handle_mesh_begin(request *r) {
   server *srv = r->srv;
   api_upload query;
@@ -29,10 +50,16 @@ void handle_mesh_begin(request *r) {
     reply_problem(r, &problem); /* now, before the client sends the whole file */
     return;
   }
-  const char *length = header_of(r, "Content-Length");
-  uint64_t expected = length ? strtoull(length, NULL, 10) : 0;
-  if (expected + (uint64_t)srv->options->disk_reserve > objects_free_bytes(srv->store)) {
-    refuse_full(r);
+  const int64_t announced = announced_bytes(r);
+  const temporary_limits limits = limits_of(r);
+  r->takes.owner = r->holder;
+  const temporary_room room = temporary_look(srv->arriving, &r->takes, announced, &limits);
+  if (!r->decoder && !access_takes_file(r, announced, &problem)) { /* a compressed file has another size */
+    reply_problem(r, &problem);
+    return;
+  }
+  if (room != TEMPORARY_FREE) {
+    refuse_room(r, room);
     return;
   }
   store_result begun = objects_begin(srv->store, &r->temp);
@@ -43,13 +70,18 @@ void handle_mesh_begin(request *r) {
   api_hash_begin(&r->hash);
 }
 
-/* Checks the disk reserve again every LOOK_BYTES: chunked and compressed bodies do not announce their size, and other
+/* Looks at quota and disk again with each piece: chunked and compressed bodies do not announce their size, and other
  * uploads take space meanwhile. */
 void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
-  const server *srv = r->srv;
-  if (r->received / LOOK_BYTES != (r->received - (int64_t)size) / LOOK_BYTES &&
-      objects_free_bytes(srv->store) < (uint64_t)srv->options->disk_reserve) {
-    refuse_full(r);
+  api_problem problem = {0};
+  if (!access_takes_file(r, r->received, &problem)) {
+    reply_problem(r, &problem);
+    return;
+  }
+  const temporary_limits limits = limits_of(r);
+  const temporary_room room = temporary_take(r->srv->arriving, &r->takes, (int64_t)size, &limits);
+  if (room != TEMPORARY_FREE) {
+    refuse_room(r, room);
     return;
   }
   store_result stored = objects_append(&r->temp, bytes, size);
@@ -186,7 +218,7 @@ static void upload_away(request *r) {
     reply_problem(r, &problem);
   }
   if (done) {
-    objects_abandon(&r->temp);
+    upload_abandon(r);
   }
   intake_close(&file);
 }

@@ -11,6 +11,7 @@
 #include "api/landmark_codec.h"
 #include "api/transfer_codec.h"
 #include "http/http.h"
+#include "http/read_json.h"
 #include "metrics.h"
 #include "store/object_removal.h"
 
@@ -220,7 +221,7 @@ static void morph_away(request *r) {
   cJSON *body = cJSON_CreateObject();
   int fine = add_members(r, body, &problem) && resolve_landmarks(r, body, &problem) &&
              wanted_supermesh(r, body, &wish, &problem);
-  cJSON_Delete(body);
+  json_done(body); /* resolve_landmarks() reads JSON */
   if (!fine) {
     reply_problem(r, &problem);
   } else {

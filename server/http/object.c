@@ -41,9 +41,17 @@ static void add_headers(request *r, const char *mime, const char *disposition, i
   }
 }
 
-/* Reads a part of an object into memory of malloc(); NULL on failure, or if it is larger than `most`. */
-static void *read_part(const request *r, object_kind kind, const char *id, object_part part, size_t most,
-                       size_t *size) {
+static void free_part(request *r, void *bytes) {
+  free(bytes);
+  request_holds(r, &r->answer_bytes, 0);
+}
+
+/* The size of a part for which there is no room now. */
+#define NO_ROOM SIZE_MAX
+
+/* Reads a part of an object into memory; NULL on failure, if it is larger than `most`, or if there is no room for it:
+ * *size is NO_ROOM then. For free_part(). */
+static void *read_part(request *r, object_kind kind, const char *id, object_part part, size_t most, size_t *size) {
   int fd;
   uint64_t whole;
   *size = 0;
@@ -51,13 +59,19 @@ static void *read_part(const request *r, object_kind kind, const char *id, objec
     return NULL;
   }
   uint64_t wanted = part.length ? part.length : whole;
-  char *bytes = wanted >= ENCODE_LEAST && wanted <= most ? malloc((size_t)wanted) : NULL;
+  const int is_wanted = wanted >= ENCODE_LEAST && wanted <= most;
+  if (is_wanted && !request_holds(r, &r->answer_bytes, (int64_t)wanted)) {
+    close(fd);
+    *size = NO_ROOM;
+    return NULL;
+  }
+  char *bytes = is_wanted ? malloc((size_t)wanted) : NULL;
   for (ssize_t n = 1; bytes && n > 0 && *size<wanted; *size += n> 0 ? (size_t)n : 0) {
     n = pread(fd, bytes + *size, (size_t)wanted - *size, (off_t)(part.start + *size));
   }
   close(fd);
   if (*size < wanted) {
-    free(bytes);
+    free_part(r, bytes);
     bytes = NULL;
   }
   return bytes;
@@ -80,8 +94,8 @@ static int choose_memory(request *r, object_kind kind, const char *id, const cha
   }
   if (!found) {
     void *bytes = read_part(r, kind, id, (object_part){0}, MEMORY_MOST, &size);
-    found = encoded_make(r->srv->encoded, key, CODING_NONE, bytes, size);
-    free(bytes);
+    found = size == NO_ROOM ? NULL : encoded_make(r->srv->encoded, key, CODING_NONE, bytes, size);
+    free_part(r, bytes);
   }
   if (found && found->bytes) {
     r->encoded = found;
@@ -111,7 +125,7 @@ static int choose_form(request *r, object_kind kind, const char *id, object_part
     if (bytes) {
       reply_choose(r, key, etag, bytes, size);
     }
-    free(bytes);
+    free_part(r, bytes);
   }
   return r->encoded || choose_memory(r, kind, id, key);
 }

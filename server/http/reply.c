@@ -101,8 +101,23 @@ static coding squeeze(const request *r, api_text *text) {
   return which;
 }
 
+static void refuse_held(request *r) {
+  reply_refuse(
+      r, "unavailable",
+      "The answers that the server holds for its callers have as many bytes as they may; try again soon, or ask "
+      "for less at once.");
+}
+
+/* Bytes of an answer that is sent even where there is no room for it: the refusal that says so, and every short one. */
+enum { ANSWER_SHORT = 2048 };
+
 void reply_text(request *r, unsigned status, const char *mime, api_text *text) {
   struct MHD_Response *response = NULL;
+  if (!request_holds(r, &r->answer_bytes, (int64_t)text->size) && text->size > ANSWER_SHORT) {
+    api_text_free(text);
+    refuse_held(r);
+    return;
+  }
   int large = text->size >= ENCODE_LEAST;
   coding which = squeeze(r, text);
   size_t size = text->size;
@@ -270,6 +285,11 @@ void reply_cached(request *r, unsigned status, const cached *entry) {
   reply_choose(r, key, entry->etag, entry->row.json, entry->json_size);
   int decided = reads && reply_conditions(r, r->etag);
   if (decided && r->status != 304) {
+    cache_release(r->srv->descriptions, entry);
+    return;
+  }
+  if (!decided && !r->encoded && !request_holds(r, &r->answer_bytes, (int64_t)entry->json_size)) {
+    refuse_held(r);
     cache_release(r->srv->descriptions, entry);
     return;
   }

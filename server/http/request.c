@@ -1,6 +1,7 @@
-/* What all handlers share: the clock, and a request's fields in the log. */
+/* What all handlers share: the clock, a request's fields in the log, and the memory that it holds. */
 #include <poll.h>
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
 #include "http/http.h"
@@ -23,8 +24,19 @@ int request_is_wanted(void *user) {
   return poll(&look, 1, 0) <= 0 || clock_us() - r->began < HALF_OPEN_US;
 }
 
+int request_holds(request *r, held_part *part, int64_t now) {
+  return held_set(r->srv->held, r->holder, part, now);
+}
+
+/* Of a path without such a route, the method is whatever the caller sent. */
+static const char *method_of(const request *r) {
+  static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZ";
+  const char *sent = r->method ? r->method : "";
+  return r->route ? r->route->method : sent[strspn(sent, letters)] == 0 ? sent : "";
+}
+
 void request_fields(const request *r, char out[REQUEST_FIELDS]) {
   snprintf(out, REQUEST_FIELDS, "\"request\":\"%s\"%s%s%s,\"method\":\"%.8s\",\"route\":\"%s\"", r->number,
-           r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "",
-           r->route ? r->route->method : "", r->route ? r->route->path : "");
+           r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "", method_of(r),
+           r->route ? r->route->path : "");
 }

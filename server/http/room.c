@@ -42,16 +42,17 @@ int room_make(const request *r, int64_t bytes) {
   return made;
 }
 
-void room_refuse(request *r, const room *space) {
+void room_refuse(request *r, const room *space, int64_t needs) {
   api_problem problem = {0};
   const char *tenant = access_tenant(r);
   int64_t pending = space->quota - space->used - space->left;
   api_refuse(
       &problem, "quota-exceeded",
-      "The tenant \"%s\" may store %lld bytes of embeddings and supermeshes. It stores %lld, its unfinished jobs "
-      "will add about %lld, and this job does not fit in the rest. Delete results that are not needed, or ask "
-      "the operator for a larger quota (orbmorphd token set NAME --quota-derived BYTES).",
-      tenant, (long long)space->quota, (long long)space->used, (long long)pending);
+      "The tenant \"%s\" may store %lld bytes of embeddings, supermeshes and requests of unfinished jobs. It stores "
+      "%lld, its unfinished jobs take about %lld with their results, and this job needs about %lld, which does not fit "
+      "in the rest. Wait until jobs end, or cancel some. Delete results that are not needed, or ask the operator for a "
+      "larger quota (orbmorphd token set NAME --quota-derived BYTES).",
+      tenant, (long long)space->quota, (long long)space->used, (long long)pending, (long long)needs);
   api_json_member_integer(&problem.facts, "quota", space->quota);
   api_json_member_integer(&problem.facts, "used", space->used);
   api_json_member_integer(&problem.facts, "pending", pending);

@@ -13,7 +13,7 @@ typedef struct room {
 store_result room_measure(const request *r, room *out);
 /* Deletes kept alignments of the tenant, oldest first, until `bytes` are free or none is left. 1 if it deleted any. */
 int room_make(const request *r, int64_t bytes);
-/* queue_submit() found no room: answers with the problem. */
-void room_refuse(request *r, const room *space);
+/* queue_submit() found no room: answers with the problem. needs: the bytes of the job. */
+void room_refuse(request *r, const room *space, int64_t needs);
 
 #endif

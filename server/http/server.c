@@ -4,8 +4,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 
 #include "faults.h"
+#include "hash.h"
+#include "http/addresses.h"
 #include "http/body.h"
 #include "http/certificate.h"
 #include "http/http.h"
@@ -55,6 +60,14 @@ static void make_number(char out[2 * sizeof(uint64_t) + 1]) {
   sodium_bin2hex(out, 2 * sizeof hashed + 1, hashed, sizeof hashed);
 }
 
+/* Whose part of the memory a request without a tenant takes. */
+static uint64_t holder_at(struct MHD_Connection *connection) {
+  const union MHD_ConnectionInfo *from = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+  return from && from->client_addr ? address_hash(from->client_addr) | HASH_OF_OWNER : HASH_OF_OWNER;
+}
+
+enum { TARGET_SHORT = 512 }; /* bytes that do not count */
+
 /* Called with the target of the request line, before any header has arrived. The library keeps no copy of the target
  * as sent, which signatures cover. */
 static void *request_create(void *user, const char *target, struct MHD_Connection *connection) {
@@ -64,9 +77,20 @@ static void *request_create(void *user, const char *target, struct MHD_Connectio
   if (target_refused(target, number, connection)) {
     return NULL; /* the library may drop the connection without another call, so nothing is allocated */
   }
+  server *srv = user;
+  held_part bytes = {0};
+  const uint64_t from = holder_at(connection);
+  if (size > TARGET_SHORT && !held_set(srv->held, from, &bytes, (int64_t)size)) {
+    target_lacks_room(number, connection);
+    return NULL;
+  }
   request *r = calloc(1, sizeof *r + size);
-  if (r) {
-    r->srv = user;
+  if (!r) {
+    held_set(srv->held, from, &bytes, 0);
+  } else {
+    r->from = from;
+    r->target_bytes = bytes;
+    r->srv = srv;
     r->connection = connection;
     memcpy(r->target, target, size);
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
@@ -81,6 +105,25 @@ static void *request_create(void *user, const char *target, struct MHD_Connectio
 /* A node of the role work. */
 static int is_about_node(const request *r, const char *path) {
   return access_is_open(path) || (r->route && r->route->id == ROUTE_METRICS);
+}
+
+/* Whose part of memory and disk the request takes: its tenant's or, without one, that of its address. */
+static uint64_t holder_of(const request *r) {
+  const char *tenant = access_tenant(r);
+  return tenant[0] ? tenant_hash(tenant) : r->from;
+}
+
+/* What the headers of an admitted request decide. */
+static void request_admit(request *r, const char *path, const char *allow) {
+  api_problem problem = {0};
+  r->holder = holder_of(r);
+  if (!r->route) {
+    answer_unrouted(r, path, allow);
+  } else if (!query_check(r, &problem)) {
+    reply_problem(r, &problem);
+  } else if (r->route->body != ROUTE_NO_BODY) {
+    body_begin(r);
+  }
 }
 
 /* The first call of answer() for a request, with its headers. Leaves a response if the headers alone decide it. */
@@ -108,12 +151,8 @@ static void request_begin(request *r, const char *method, const char *url, const
   } else if (!sign_check(r, path, &problem) || !browser_check(r, url, path, &problem) ||
              !access_check(r, path, &problem)) {
     reply_problem(r, &problem);
-  } else if (!r->route) {
-    answer_unrouted(r, path, allow);
-  } else if (!query_check(r, &problem)) {
-    reply_problem(r, &problem);
-  } else if (r->route->body != ROUTE_NO_BODY) {
-    body_begin(r);
+  } else {
+    request_admit(r, path, allow);
   }
 }
 
@@ -196,6 +235,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
     return;
   }
   int64_t took = clock_us() - r->began;
+  held_set(r->srv->held, r->from, &r->target_bytes, 0);
   if (!r->begun) { /* the connection broke before the headers were complete */
     free(r);
     *state = NULL;
@@ -222,12 +262,13 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   }
   watched_done(r->watched);
   queue_release(r->srv->q, r->waits_for);
-  objects_abandon(&r->temp);
+  upload_abandon(r);
   body_free(r);
   api_text_free(&r->refusal);
   if (r->response) {
     MHD_destroy_response(r->response);
   }
+  request_holds(r, &r->answer_bytes, 0);
   caller_release(r->caller);
   signer_release(r->signer);
   encoded_release(r->encoded);
@@ -260,6 +301,15 @@ static void on_mhd_log(void *user, const char *format, va_list args) {
 /* GnuTLS would also offer TLS 1.0 and 1.1, which RFC 8996 forbids. */
 static const char TLS_VERSIONS[] = "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2";
 
+/* Blocks of 128 KB and more go back to the system when they are freed. Without this, the C library would raise that
+ * size after the first large body, and keep all that follow in the heaps of its threads. */
+static void give_back_large_blocks(void) {
+#if defined(__GLIBC__)
+  (void)mallopt(M_MMAP_THRESHOLD, 128 << 10);
+  (void)mallopt(M_TRIM_THRESHOLD, 1 << 20);
+#endif
+}
+
 int http_start(server *srv) {
   const config *o = srv->options;
   int tls = o->tls_key[0] != 0;
@@ -271,7 +321,9 @@ int http_start(server *srv) {
     return 0;
   }
   regions_in(o->data);
-  srv->encoded = encoded_open((size_t)o->encoded_bytes);
+  give_back_large_blocks();
+  srv->held = held_create(o->request_memory);
+  srv->encoded = srv->held ? encoded_open((size_t)o->encoded_bytes, srv->held) : NULL;
   srv->connections = srv->encoded ? watch_start(o, srv->needs_token) : NULL;
   if (!srv->connections) {
     log_error("the thread that watches connections cannot be started");
@@ -308,5 +360,7 @@ void http_stop(server *srv) {
   watch_stop(srv->connections);
   srv->connections = NULL;
   encoded_close(srv->encoded);
+  held_destroy(srv->held);
   srv->encoded = NULL;
+  srv->held = NULL;
 }

@@ -29,10 +29,15 @@ static double count_entries(const char *folder) {
   return count;
 }
 
-/* What the last round of the scrub found. */
-static void write_scrub(scrub *from, api_text *text) {
+/* What the last round of the scrub found, and what requests and jobs have met since. */
+static void read_scrub(const server *srv, scrub_report *out) {
+  scrub_read(srv->scrub, out);
+  out->catalogue_damaged |= catalogue_is_damaged(srv->cat);
+}
+
+static void write_scrub(const server *srv, api_text *text) {
   scrub_report found;
-  scrub_read(from, &found);
+  read_scrub(srv, &found);
   metrics_family(text, "orbmorph_scrub_rounds_total", "counter", "Rounds over all stored files that have ended.");
   api_text_printf(text, "orbmorph_scrub_rounds_total %lld\n", (long long)found.rounds);
   metrics_family(text, "orbmorph_scrub_bytes_total", "counter", "Bytes of stored files that those rounds compared.");
@@ -45,7 +50,7 @@ static void write_scrub(scrub *from, api_text *text) {
         (double)found.unreadable);
   gauge(text, "orbmorph_objects_without_row", "Stored files that no row names, at the last round.",
         (double)found.without_row);
-  gauge(text, "orbmorph_catalogue_damaged", "1 if SQLite's quick_check found damage at the last round.",
+  gauge(text, "orbmorph_catalogue_damaged", "1 if SQLite's quick_check, a request or a job has found damage.",
         found.catalogue_damaged);
 }
 
@@ -115,7 +120,7 @@ static void metrics_away(request *r) {
   write_tenants(srv->cat, &text);
   gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system that holds the data folder.",
         (double)objects_free_bytes(srv->store));
-  write_scrub(srv->scrub, &text);
+  write_scrub(srv, &text);
   write_traces(&text);
   gauge(&text, "orbmorph_queue_limit", "Largest number of unfinished jobs.", (double)srv->options->queue_limit);
   gauge(&text, "orbmorph_decoding_bytes", "Bytes held by decoders of compressed bodies.",
@@ -156,7 +161,7 @@ static enum MHD_Result ready(request *r) {
     reply_refuse(r, "unavailable", "The daemon is starting or stopping; try again soon.");
     return MHD_YES;
   }
-  scrub_read(srv->scrub, &found);
+  read_scrub(srv, &found);
   if (found.catalogue_damaged) {
     reply_refuse(r, "unavailable", "The catalogue is damaged: stop the daemon and restore a backup.");
     return MHD_YES;

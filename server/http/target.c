@@ -21,6 +21,7 @@ static void write_bytes(const char *bytes, size_t size, int fd, gnutls_session_t
   }
 }
 
+/* status: with further headers, if any. */
 static void refuse(struct MHD_Connection *connection, const char *number, const char *status, api_problem *problem) {
   const union MHD_ConnectionInfo *fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD),
                                  *tls = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
@@ -62,6 +63,14 @@ int target_refused(const char *target, const char *number, struct MHD_Connection
   }
   refuse(connection, number, "414 URI Too Long", &problem);
   return 1;
+}
+
+void target_lacks_room(const char *number, struct MHD_Connection *connection) {
+  api_problem problem = {0};
+  api_refuse(&problem, "unavailable",
+             "The server holds as many bytes of requests and answers as it may, or this caller its part of them; try "
+             "again soon, or with a shorter target.");
+  refuse(connection, number, "503 Service Unavailable\r\nRetry-After: 2", &problem);
 }
 
 typedef struct taken {

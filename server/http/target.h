@@ -15,6 +15,8 @@ enum { TARGET_PARAMETERS = 128, TARGET_BYTES = 10 * 1024 };
  * headers leave no room for an answer (431). It writes to the socket or the TLS session past the library. 1: it refused
  * the request, and nothing may follow on the connection. */
 int target_refused(const char *target, const char *number, struct MHD_Connection *connection);
+/* Answers 503: there is no memory for a copy of the target. Nothing may follow on the connection. */
+void target_lacks_room(const char *number, struct MHD_Connection *connection);
 /* Call it once, when the headers have arrived. */
 int target_headers_refused(const char *number, struct MHD_Connection *connection);
 

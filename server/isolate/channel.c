@@ -12,6 +12,11 @@ typedef struct head {
   uint64_t size;
 } head;
 
+/* After a call that failed. */
+static channel_result closed_or_failed(void) {
+  return errno == EPIPE || errno == ECONNRESET ? CHANNEL_CLOSED : CHANNEL_FAILED;
+}
+
 static channel_result wait_for(int fd, short events, channel_continues continues, void *user) {
   while (!continues || continues(user)) {
     struct pollfd one = {.fd = fd, .events = events};
@@ -20,7 +25,7 @@ static channel_result wait_for(int fd, short events, channel_continues continues
       return CHANNEL_OK;
     }
     if (ready < 0 && errno != EINTR) {
-      return CHANNEL_CLOSED;
+      return CHANNEL_FAILED;
     }
   }
   return CHANNEL_STOPPED;
@@ -43,7 +48,7 @@ static channel_result send_some(int fd, struct msghdr *message, int *passed, int
   ssize_t sent = sendmsg(fd, message, MSG_NOSIGNAL | MSG_DONTWAIT);
   *full = sent < 0;
   if (sent < 0) {
-    return errno == EINTR || errno == EAGAIN ? CHANNEL_OK : CHANNEL_CLOSED;
+    return errno == EINTR || errno == EAGAIN ? CHANNEL_OK : closed_or_failed();
   }
   *passed = -1; /* it went with the first byte */
   for (size_t left = (size_t)sent; left > 0 && message->msg_iovlen > 0;) {
@@ -118,7 +123,7 @@ static channel_result receive_all(int fd, void *to, size_t size, int *passed, in
       continue;
     }
     if (got <= 0) {
-      return CHANNEL_CLOSED;
+      return got == 0 ? CHANNEL_CLOSED : closed_or_failed();
     }
     take_passed(&message, passed);
     done += (size_t)got;
@@ -136,7 +141,7 @@ channel_result channel_receive(int fd, size_t most, frame *out, channel_continue
     result = CHANNEL_BAD;
   }
   if (result == CHANNEL_OK && !(out->bytes = malloc(begin.size + 1))) {
-    result = CHANNEL_CLOSED;
+    result = CHANNEL_FAILED;
   }
   if (result == CHANNEL_OK) {
     out->type = (frame_type)begin.type;

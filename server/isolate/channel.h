@@ -40,8 +40,9 @@ typedef struct frame {
 enum { CHANNEL_LOOK_MS = 20, CHANNEL_UNASKED = 64 };
 typedef int (*channel_continues)(void *user);
 
-/* Closed: also if this end has no memory for the frame. Bad: what arrived is no frame, or a larger one than allowed. */
-typedef enum channel_result { CHANNEL_OK, CHANNEL_CLOSED, CHANNEL_STOPPED, CHANNEL_BAD } channel_result;
+/* Closed: by the other end. Failed: this end has no memory for the frame. Bad: what arrived is no frame, or a larger
+ * one than allowed. */
+typedef enum channel_result { CHANNEL_OK, CHANNEL_CLOSED, CHANNEL_FAILED, CHANNEL_STOPPED, CHANNEL_BAD } channel_result;
 
 /* Sends the parts as one payload, and a copy of the descriptor unless it is −1. */
 channel_result channel_send(int fd, frame_type type, const struct iovec *parts, int count, int passed,

@@ -3,6 +3,7 @@
  * channel.h   the frames that both sides exchange
  * sandbox.h   what such a process may not do
  * zygote.c    the small process that forks them
+ * end.c       the end of one of them
  * readers.h   processes that check several small files
  *
  * The daemon starts this program again in an internal mode, as the zygote: a process with one thread and without
@@ -26,6 +27,11 @@ typedef enum isolate_mode { ISOLATE_OFF, ISOLATE_ON, ISOLATE_STRICT } isolate_mo
 int isolate_start(isolate_mode mode);
 void isolate_stop(void);
 int isolate_is_on(void);
+/* Whether no process may work that is not confined. In a forked process, too. */
+int isolate_is_strict(void);
+/* A process, or the zygote for all, reports which of SANDBOX_ALL do not hold; 0: all do. The log says so, once each if
+ * the work goes on. 1: isolate = strict forbids the work. */
+int isolate_lacks(int lacks);
 
 /* One process. */
 typedef struct isolated {
@@ -36,29 +42,43 @@ typedef struct isolated {
   void *user;
   int64_t last_ms; /* orb_clock_ms() at which waiting ends; 0: only the context ends it */
   int unasked;     /* frames received since the context was asked last */
+  int unconfined;  /* it could not be confined, so isolate = strict allows it no work */
+  int works;       /* private, as the next two: it has work */
+  int beside;      /* others had work when this one got it */
+  unsigned begun;  /* the number of its work */
 } isolated;
 
-/* Forks a process; 0 with the reason logged. Starts a new zygote if it has died. Blocks for about a millisecond. */
+/* Forks a process; 0 with the reason logged: task_refuse_open() tells it to the caller. Starts a new zygote if it has
+ * died. Blocks for about a millisecond. */
 int isolate_open(isolated *p, orb_context *ctx);
 channel_result isolate_send(isolated *p, frame_type type, const struct iovec *parts, int count, int passed);
 /* Frames that have arrived are received even if the context has ended, but not more than CHANNEL_UNASKED of them. */
 channel_result isolate_receive(isolated *p, size_t most, frame *out);
-/* Kills the process unless it has ended, and logs what it wrote to standard error. Returns its status as of waitpid();
- * −1: unknown, or killed here. */
+/* Says that a process has work, as it has from isolate_open() on, or waits for more. */
+void isolate_set_works(isolated *p, int works);
+/* Whether no other process has had work at any time since this one got its work. */
+int isolate_is_alone(const isolated *p);
+/* Kills the process unless it has ended, and logs what it wrote to standard error. Returns its status as of waitpid(),
+ * or one of these. UNKNOWN: also one that was killed here. ORPHAN: the zygote has ended, and all processes with it. */
+enum { ISOLATE_UNKNOWN = -1, ISOLATE_ORPHAN = -2 };
 int isolate_close(isolated *p);
 /* Describes an end without an answer. breach: what the process sent against the protocol, for which the daemon ended it
  * ("broke the protocol: too many reports"); NULL: describes its status, which is not 0 ("was killed by signal 11
  * (Segmentation fault)"). */
 void isolate_end_text(const char *breach, int status, char *out, size_t room);
 
-/* Whether an end without an answer counts as a crash of the work, which had the process to itself. A breach counts, and
- * so does SIGKILL by another than the daemon: memory was short, and the work may need that much each time. An unknown
- * end does not: all processes end so with the one that forks them, and so does one that the daemon ends because it
- * fails itself. */
-int isolate_end_counts(const char *breach, int status);
+/* Whether a status as of isolate_close() is SIGKILL by another than the daemon. */
+int isolate_was_killed(int status);
 
-/* A breach: CHANNEL_BAD. */
-#define ISOLATE_NO_FRAME "bytes that are no frame, or too large a one"
+/* Whether an end without an answer counts as a crash of the work, which had the process to itself. A breach counts.
+ * SIGKILL by another than the daemon counts if no other process worked meanwhile (alone): memory was short, and the
+ * work may need that much each time; otherwise the others may have taken it. An unknown end does not count: all
+ * processes end so with the one that forks them, and so does one that the daemon ends because it fails itself. */
+int isolate_end_counts(const char *breach, int status, int alone);
+
+/* Whether a process that sends or takes no more frames broke the protocol, and how; NULL: it has ended, or was stopped.
+ * Waits until a process that closed its channel has ended: it closes the channel to end, and not to go on unheard. */
+const char *isolate_breach(const isolated *p, channel_result got);
 
 /* The zygote's side: never returns. work: runs in each forked process, with its channel. */
 enum { ISOLATE_FD = 3 };

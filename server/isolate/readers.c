@@ -166,6 +166,7 @@ reader *reader_take(const char *tenant, budget_part part, int64_t bytes, int64_t
   pthread_mutex_unlock(&own.lock);
   r = is_new ? start(r, tenant, part, ctx) : r;
   if (r) {
+    isolate_set_works(&r->process, 1);
     r->process.ctx = ctx;
     r->began = orb_clock_ms();
   }
@@ -174,6 +175,7 @@ reader *reader_take(const char *tenant, budget_part part, int64_t bytes, int64_t
 
 void reader_give(reader *r) {
   const int64_t now = orb_clock_ms();
+  isolate_set_works(&r->process, 0);
   pthread_mutex_lock(&own.lock);
   r->files++;
   r->work_ms += now - r->began;

@@ -69,11 +69,12 @@ int sandbox_prepare(void) {
   for (size_t i = 0; fine && i < sizeof allowed / sizeof *allowed; i++) {
     fine = seccomp_rule_add(rules, SCMP_ACT_ALLOW, allowed[i], 0) == 0;
   }
-  /* Only memory that RLIMIT_DATA counts: it does not count what is shared, grows like a stack, or was written to and
-   * can be read only. For the same reason no file in memory can be created: RLIMIT_FSIZE limits each by itself. */
+  /* Only memory that runs no code, and that RLIMIT_DATA counts: it does not count what is shared, grows like a stack,
+   * or was written to and can be read only. For the same reason no file in memory can be created: RLIMIT_FSIZE limits
+   * each by itself. */
   fine =
       fine &&
-      seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mmap), 1,
+      seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mmap), 2, SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0),
                        SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_TYPE | MAP_GROWSDOWN, MAP_PRIVATE)) == 0 &&
       seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mprotect), 1, SCMP_A2(SCMP_CMP_EQ, PROT_READ | PROT_WRITE)) == 0;
   /* Threads, but no processes. The flags of clone3() lie in memory, which a filter cannot read: ENOSYS makes the C
@@ -120,7 +121,7 @@ int sandbox_enter(const sandbox_limits *limits) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_NOFILE, DESCRIPTORS);
   limit(RLIMIT_CPU, (uint64_t)limits->cpu_seconds);
-  limit(RLIMIT_FSIZE, (uint64_t)limits->memory); /* also of a file in memory */
+  limit(RLIMIT_FSIZE, (uint64_t)limits->file);
   if (!SANDBOX_SANITIZED) {
     (void)mallopt(M_ARENA_MAX, ARENAS);
     limit(RLIMIT_AS,

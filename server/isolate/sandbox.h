@@ -20,7 +20,8 @@
 enum { SANDBOX_LANDLOCK = 1, SANDBOX_SECCOMP = 2, SANDBOX_ALL = 3 };
 
 typedef struct sandbox_limits {
-  int64_t memory;      /* bytes of the job's budget */
+  int64_t memory;      /* bytes of the job's budget, and of its inputs */
+  int64_t file;        /* bytes of each file, also of one in memory */
   int64_t cpu_seconds; /* of all threads */
   int threads, nice;
 } sandbox_limits;

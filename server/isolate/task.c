@@ -10,13 +10,27 @@
 #include "api/json.h"
 #include "isolate/sandbox.h"
 
-int task_confine(const task_head *task) {
+static int lacks; /* of SANDBOX_ALL, in this process */
+
+static int refuse_unconfined(api_problem *problem) {
+  return api_refuse(problem, "internal",
+                    "The process for this work could not be confined, as isolate = strict demands, so it has read "
+                    "nothing. Try again later; the daemon's log tells the operator why.");
+}
+
+int task_confine(int channel, const task_head *task) {
   const int results = task->kind == TASK_CHECK ? -1 : memfd_create("results", MFD_CLOEXEC);
   sandbox_limits limits = {.memory = task->limit + task->inputs,
+                           .file = task->limit,
                            .cpu_seconds = task->cpu_seconds,
                            .threads = task->threads,
                            .nice = task->nice};
-  sandbox_enter(&limits);
+  lacks = SANDBOX_ALL & ~sandbox_enter(&limits);
+  if (lacks && isolate_is_strict()) {
+    api_problem problem = {0};
+    refuse_unconfined(&problem);
+    task_end(channel, &(done_head){0}, NULL, &problem);
+  }
   return results;
 }
 
@@ -30,6 +44,7 @@ channel_result task_send_object(int channel, int results, object_kind kind, cons
 
 channel_result task_answer(int channel, done_head *done, const char *json, const api_problem *problem) {
   const char *text = done->fine ? json : problem && problem->name ? problem->facts.data : NULL;
+  done->lacks = lacks;
   if (!done->fine && problem && problem->name) {
     snprintf(done->problem, sizeof done->problem, "%s", problem->name);
     snprintf(done->detail, sizeof done->detail, "%s", problem->detail);
@@ -42,24 +57,12 @@ void task_end(int channel, done_head *done, const char *json, const api_problem 
   _exit(task_answer(channel, done, json, problem) == CHANNEL_OK ? 0 : 1);
 }
 
-/* A refusal names 32,768 loops of 262,144 vertices at most, a description 1,024 landmarks on 16 shapes. */
+/* A refusal names 32,768 loops of 262,144 vertices at most, a description as many that were closed, or 1,024 landmarks
+ * on 16 shapes. No values are made of them here. */
 enum { VALUES_MOST = 1 << 20 };
 
-cJSON *task_json(const char *text) {
-  api_json_error error;
-  const size_t size = strlen(text);
-  return api_json_count(text, size) <= VALUES_MOST ? api_json_parse(text, size, &error) : NULL;
-}
-
-/* Whether a text has the members of an object. */
-static int are_members(const char *text) {
-  api_text whole = {0};
-  api_text_printf(&whole, "{%s}", text);
-  cJSON *read = whole.failed ? NULL : task_json(whole.data);
-  const int fine = read != NULL;
-  cJSON_Delete(read);
-  api_text_free(&whole);
-  return fine;
+int task_is_object(const char *text) {
+  return api_json_is_object(text, strlen(text), 0, VALUES_MOST);
 }
 
 int task_read_object(const frame *f, object_head *head) {
@@ -82,12 +85,13 @@ int task_read_done(const frame *f, done_head *done, char **json, api_problem *pr
     return 0;
   }
   memcpy(done, f->bytes, sizeof *done);
+  isolate_lacks(done->lacks);
   done->sha[sizeof done->sha - 1] = done->places[sizeof done->places - 1] = 0;
   done->problem[sizeof done->problem - 1] = done->detail[sizeof done->detail - 1] = 0;
   const char *text = (const char *)f->bytes + sizeof *done;
   int is_empty = f->size == sizeof *done;
   if (!done->fine) {
-    if (!done->problem[0] || (!is_empty && !are_members(text))) {
+    if (!done->problem[0] || (!is_empty && !api_json_is_object(text, strlen(text), 1, VALUES_MOST))) {
       return 0;
     }
     api_refuse(problem, api_problem_name(done->problem), "%s", done->detail);
@@ -100,6 +104,11 @@ int task_read_done(const frame *f, done_head *done, char **json, api_problem *pr
     *json = strdup(text);
   }
   return is_empty || *json;
+}
+
+int task_refuse_open(const isolated *p, api_problem *problem) {
+  return p->unconfined ? refuse_unconfined(problem)
+                       : api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
 }
 
 int task_refuse_store(store_result result, api_problem *problem) {

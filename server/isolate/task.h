@@ -55,14 +55,17 @@ typedef struct object_head {
 /* FRAME_DONE; the description of the result or the facts of the problem follow. */
 typedef struct done_head {
   int fine, gone;
+  int lacks; /* which of SANDBOX_ALL do not hold in the process */
   int64_t flips, bytes, created;
   char sha[API_ID_SIZE], places[API_ID_SIZE];
   char problem[40], detail[512];
 } done_head;
 
-/* The process's side. Confines the calling process to the limits of the task. Returns the only file in memory that it
- * can write to, for its results; −1: none, as for a check. A single file, since the kernel limits each by itself. */
-int task_confine(const task_head *task);
+/* The process's side. Confines the calling process to the limits of the task. With isolate = strict, a process that
+ * cannot be confined sends the problem and ends: it has only looked at the numbers of the task, which the daemon wrote.
+ * Returns the only file in memory that it can write to, for its results; −1: none, as for a check. A single file, since
+ * the kernel limits each by itself. */
+int task_confine(int channel, const task_head *task);
 /* Sends FRAME_OBJECT, with a descriptor of that file. */
 channel_result task_send_object(int channel, int results, object_kind kind, const char *id, int64_t start,
                                 int64_t size);
@@ -76,12 +79,13 @@ int task_read_object(const frame *f, object_head *head);
 /* Frees the memory of an object that the daemon has copied: else all results of a process are in memory until it ends.
  * What the process passed is its own file, as it gets all others for reading only. */
 void task_free_object(const frame *f, const object_head *head);
-/* Reads FRAME_DONE: json is allocated with malloc(), or NULL. The caller checks it with task_json().
- * 0: the result contradicts itself. */
+/* Reads FRAME_DONE, and logs what the process lacks: json is allocated with malloc(), or NULL. The caller checks it
+ * with task_is_object(). 0: the result contradicts itself. */
 int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem);
-/* Reads JSON that a process wrote; the caller frees it with cJSON_Delete(). NULL: it is none, or has more values than
- * any description or refusal. Each would take some 80 bytes of the daemon's memory. */
-cJSON *task_json(const char *text);
+/* Whether a text that a process wrote is a JSON object, with no more values than any description or refusal. */
+int task_is_object(const char *text);
+/* Refuses work for which isolate_open() got no process; returns 0. */
+int task_refuse_open(const isolated *p, api_problem *problem);
 /* Refuses what the store could not do; returns 0. */
 int task_refuse_store(store_result result, api_problem *problem);
 /* A limit on the processor time of a job with this many threads until its deadline. */

@@ -20,14 +20,7 @@
 #include "log.h"
 #include "orbmorph/context.h"
 
-enum { PASSED_MOST = 3, HELLO_MS = 60000, PROCESSES = 1024, STATUS_MS = 2000 };
-/* A process closes its channel when it exits, and has ended well within a millisecond of that. One that still runs
- * after this many is killed. */
-enum { ENDING_MS = 20 };
-
-/* Bytes of what a process wrote to standard error that go to the log, from the first on: a message of abort() or of a
- * failed assertion has some 200. */
-enum { SAID_MOST = 1000 };
+enum { PASSED_MOST = 3, HELLO_MS = 60000, PROCESSES = 1024 };
 
 extern char **environ;
 
@@ -114,6 +107,14 @@ static int leave_out(struct dl_phdr_info *library, size_t size, void *unused) {
   return 0;
 }
 
+static struct {
+  pthread_mutex_t lock;
+  isolate_mode mode; /* __atomic; in a forked process that of the daemon */
+  int told;          /* __atomic; what the log has said to be missing, of SANDBOX_ALL */
+  int fd;            /* to the zygote; −1: none */
+  pid_t pid;
+} own = {.lock = PTHREAD_MUTEX_INITIALIZER, .fd = -1};
+
 static struct process {
   pid_t pid; /* 0: unused */
   int status;
@@ -167,7 +168,7 @@ _Noreturn static void become_process(int channel, int said, pid_t zygote, void (
   _exit(0);
 }
 
-static void fork_one(int passed[PASSED_MOST], void (*work)(int channel)) {
+static void fork_one(isolate_mode mode, int passed[PASSED_MOST], void (*work)(int channel)) {
   int slot = 0, pidfd = -1;
   pid_t zygote = getpid(), pid = -1;
   while (slot < PROCESSES && processes[slot].pid) {
@@ -176,6 +177,7 @@ static void fork_one(int passed[PASSED_MOST], void (*work)(int channel)) {
   if (slot < PROCESSES) {
     pid = FORK();
     if (pid == 0) {
+      own.mode = mode;
       become_process(passed[0], passed[2], zygote, work);
     }
   }
@@ -198,7 +200,7 @@ static int try_sandbox(void) {
   int status = 0;
   pid_t pid = FORK();
   if (pid == 0) {
-    _exit(sandbox_enter(&(sandbox_limits){.memory = 64 << 20, .cpu_seconds = 10, .threads = 1}));
+    _exit(sandbox_enter(&(sandbox_limits){.memory = 64 << 20, .file = 64 << 20, .cpu_seconds = 10, .threads = 1}));
   }
   return pid > 0 && waitpid(pid, &status, 0) == pid && WIFEXITED(status) ? WEXITSTATUS(status) : 0;
 }
@@ -242,19 +244,12 @@ _Noreturn void isolate_zygote(void (*work)(int channel)) {
       _exit(0); /* the daemon has ended */
     }
     if (count == PASSED_MOST) {
-      fork_one(passed, work);
+      fork_one((isolate_mode)number, passed, work);
     }
   }
 }
 
 /* ---- the daemon ---- */
-
-static struct {
-  pthread_mutex_t lock;
-  isolate_mode mode;
-  int fd; /* to the zygote; −1: none */
-  pid_t pid;
-} own = {.lock = PTHREAD_MUTEX_INITIALIZER, .fd = -1};
 
 enum { TUNABLES_MOST = 1024 }; /* bytes of the variable with its name; an administrator's longer text stays as it is */
 
@@ -339,6 +334,19 @@ static int start_zygote(int *holds) {
   return 0;
 }
 
+/* Says what does not hold: once each, unless work fails for it. */
+static void tell_missing(int lacks, int fails, const char *consequence) {
+  const int told = __atomic_fetch_or(&own.told, lacks, __ATOMIC_RELAXED);
+  if (fails || (lacks & ~told)) {
+    log_write(fails ? LOG_ERROR : LOG_WARN, NULL,
+              "%s missing here: the processes of jobs are limited, but less confined%s",
+              lacks == SANDBOX_ALL       ? "landlock and seccomp"
+              : lacks & SANDBOX_LANDLOCK ? "landlock"
+                                         : "seccomp",
+              fails ? consequence : "");
+  }
+}
+
 int isolate_start(isolate_mode mode) {
   int holds = 0;
   if (mode == ISOLATE_OFF) {
@@ -346,19 +354,14 @@ int isolate_start(isolate_mode mode) {
   }
   pthread_mutex_lock(&own.lock);
   int fine = start_zygote(&holds);
-  own.mode = fine ? mode : ISOLATE_OFF;
+  __atomic_store_n(&own.mode, fine ? mode : ISOLATE_OFF, __ATOMIC_RELAXED);
   pthread_mutex_unlock(&own.lock);
   if (!fine) {
     log_error("meshes and jobs cannot have processes of their own; isolate = off runs them within the daemon");
     return 0;
   }
   if (holds != SANDBOX_ALL) {
-    const char *missing = holds == SANDBOX_LANDLOCK  ? "seccomp"
-                          : holds == SANDBOX_SECCOMP ? "landlock"
-                                                     : "landlock and seccomp";
-    log_write(mode == ISOLATE_STRICT ? LOG_ERROR : LOG_WARN, NULL,
-              "%s missing here: the processes of jobs are limited, but less confined%s", missing,
-              mode == ISOLATE_STRICT ? "; isolate = strict does not start without" : "");
+    tell_missing(SANDBOX_ALL & ~holds, mode == ISOLATE_STRICT, "; isolate = strict does not start without");
     if (mode == ISOLATE_STRICT) {
       isolate_stop();
       return 0;
@@ -367,10 +370,18 @@ int isolate_start(isolate_mode mode) {
   return 1;
 }
 
+int isolate_lacks(int lacks) {
+  const int is_strict = isolate_is_strict();
+  if (lacks & SANDBOX_ALL) {
+    tell_missing(lacks & SANDBOX_ALL, is_strict, "; isolate = strict does no work without");
+  }
+  return is_strict && (lacks & SANDBOX_ALL);
+}
+
 void isolate_stop(void) {
   pthread_mutex_lock(&own.lock);
   end_zygote();
-  own.mode = ISOLATE_OFF;
+  __atomic_store_n(&own.mode, ISOLATE_OFF, __ATOMIC_RELAXED);
   pthread_mutex_unlock(&own.lock);
 }
 
@@ -378,13 +389,30 @@ int isolate_is_on(void) {
   return __atomic_load_n(&own.mode, __ATOMIC_RELAXED) != ISOLATE_OFF;
 }
 
+int isolate_is_strict(void) {
+  return __atomic_load_n(&own.mode, __ATOMIC_RELAXED) == ISOLATE_STRICT;
+}
+
+/* Under the lock. A new zygote may lack what the first one had, such as memory for the filter of system calls. */
+static int start_again(isolated *p) {
+  int holds = 0;
+  if (!start_zygote(&holds)) {
+    return 0;
+  }
+  p->unconfined = isolate_lacks(SANDBOX_ALL & ~holds);
+  if (p->unconfined) {
+    end_zygote();
+  }
+  return !p->unconfined;
+}
+
 static int fork_process(isolated *p, const int passed[PASSED_MOST]) {
-  int number = 0, holds, got[PASSED_MOST];
+  int number = 0, got[PASSED_MOST];
   for (int tries = 0; tries < 2; tries++) {
-    if (own.fd < 0 && !start_zygote(&holds)) {
+    if (own.fd < 0 && !start_again(p)) {
       return 0;
     }
-    int count = tell(own.fd, 1, passed, PASSED_MOST) ? hear(own.fd, &number, got) : -1;
+    int count = tell(own.fd, (int)own.mode, passed, PASSED_MOST) ? hear(own.fd, &number, got) : -1;
     if (count >= 0) {
       p->pidfd = count > 0 ? got[0] : -1;
       return number > 0 && count > 0;
@@ -424,6 +452,7 @@ int isolate_open(isolated *p, orb_context *ctx) {
   if (!open_pairs(p, passed)) {
     return 0;
   }
+  isolate_set_works(p, 1);
   pthread_mutex_lock(&own.lock);
   int fine = fork_process(p, passed);
   pthread_mutex_unlock(&own.lock);
@@ -431,8 +460,12 @@ int isolate_open(isolated *p, orb_context *ctx) {
     close(passed[i]);
   }
   if (!fine) {
-    log_error("no process could be forked for a job");
+    const int unconfined = p->unconfined;
+    if (!unconfined) { /* else that has been said */
+      log_error("no process could be forked for a job");
+    }
     isolate_close(p);
+    p->unconfined = unconfined;
   }
   return fine;
 }
@@ -456,66 +489,4 @@ channel_result isolate_receive(isolated *p, size_t most, frame *out) {
     return CHANNEL_STOPPED;
   }
   return channel_receive(p->channel, most, out, continues, p);
-}
-
-/* Logs what a process wrote to standard error as a part of a line. */
-static void log_said(int said) {
-  char text[SAID_MOST];
-  api_text fields = {0};
-  ssize_t size = read(said, text, SAID_MOST);
-  if (size <= 0) {
-    return;
-  }
-  api_json_member_output(&fields, "wrote", text, (size_t)size);
-  if (!fields.failed) {
-    log_write(LOG_WARN, fields.data, "a process of a job or a check wrote to its standard error");
-  }
-  api_text_free(&fields);
-}
-
-int isolate_close(isolated *p) {
-  int status = -1;
-  if (p->channel >= 0) {
-    close(p->channel);
-  }
-  if (p->status >= 0) {
-    /* It has ended, or ends within moments of its last frame; else it is killed, which says nothing of it. Its status
-     * comes later where the processor is busy: another process reports that. */
-    struct pollfd end = {.fd = p->pidfd, .events = POLLIN}, reported = {.fd = p->status, .events = POLLIN};
-    const int runs = p->pidfd >= 0 && poll(&end, 1, ENDING_MS) <= 0;
-    if (runs) {
-      (void)syscall(SYS_pidfd_send_signal, p->pidfd, SIGKILL, NULL, 0);
-    }
-    if (p->pidfd >= 0 &&
-        (poll(&reported, 1, STATUS_MS) <= 0 || read(p->status, &status, sizeof status) != sizeof status)) {
-      status = -1;
-    }
-    status = runs && WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL ? -1 : status;
-    close(p->status);
-  }
-  if (p->pidfd >= 0) {
-    close(p->pidfd);
-  }
-  if (p->said >= 0) {
-    log_said(p->said);
-    close(p->said);
-  }
-  *p = (isolated){.channel = -1, .status = -1, .pidfd = -1, .said = -1};
-  return status;
-}
-
-int isolate_end_counts(const char *breach, int status) {
-  return breach || status != -1;
-}
-
-void isolate_end_text(const char *breach, int status, char *out, size_t room) {
-  if (breach) {
-    snprintf(out, room, "broke the protocol: %s", breach);
-  } else if (status != -1 && WIFSIGNALED(status)) {
-    snprintf(out, room, "was killed by signal %d (%s)", WTERMSIG(status), strsignal(WTERMSIG(status)));
-  } else if (status != -1 && WIFEXITED(status)) {
-    snprintf(out, room, "exited with status %d", WEXITSTATUS(status));
-  } else {
-    snprintf(out, room, "ended for an unknown reason");
-  }
 }

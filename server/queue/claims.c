@@ -51,13 +51,15 @@ static queue_result submit_once(queue *q, const queue_request *request, job **ou
     return stopping ? QUEUE_STOPPING : QUEUE_ERROR;
   }
   job_row row = j->row;
+  row.request = (char *)(uintptr_t)request->request;
   job_submission s = {.row = &row,
                       .hook = request->hook,
                       .limit = q->options.limit,
                       .owner_limit = request->owner_limit,
                       .room = request->room,
                       .head = queue_bytes_of(0),
-                      .triangle = queue_bytes_of(1) - queue_bytes_of(0)};
+                      .triangle = queue_bytes_of(1) - queue_bytes_of(0),
+                      .needs = queue_needs_of(request)};
   FAULT_POINT("before-accept");
   store_result stored = catalogue_job_submit(q->cat, &s);
   FAULT_POINT("after-accept");
@@ -95,20 +97,21 @@ queue_result shared_submit(queue *q, const queue_request *request, job **out, in
 static int may_claim(const queue *q, queue_lane lane, claim_wish *wish) {
   const sharing *s = q->shared;
   const int workers = q->options.workers, computing = q->running - q->fetching - q->guests;
-  const int most_large = workers > 1 ? workers - 1 : 1;
+  const int most_large = workers > 1 ? workers - 1 : 1, kept = schedule_is_kept(q, orb_clock_ms());
   int big = 1;
   *wish = (claim_wish){.node = s->node,
                        .fetches = lane == QUEUE_FETCHES,
                        .fetches_most = QUEUE_FETCHES_OF_OWNER,
                        .most_cost = INT64_MAX,
+                       .alone_ms = q->isolated ? SUSPECT_MS : INT64_MAX,
                        .big = 1};
   if (!s->options.works || !s->look[lane] || s->looking[lane] || orb_clock_ms() < s->hold_until) {
     return 0;
   }
   if (lane == QUEUE_FETCHES) {
-    return !q->exclusive;
+    return !kept;
   }
-  if (lane == QUEUE_GUESTS && computing < workers && !q->exclusive) {
+  if (lane == QUEUE_GUESTS && computing < workers && !kept) {
     return 0;
   }
   wish->most_cost = schedule_room(q, lane, &big);
@@ -118,18 +121,20 @@ static int may_claim(const queue *q, queue_lane lane, claim_wish *wish) {
     if (q->running_large >= most_large && wish->most_cost > LARGE) {
       wish->most_cost = LARGE;
     }
-    return !q->exclusive && wish->most_cost >= 0;
+    return !kept && wish->most_cost >= 0;
   }
   const int beside_large = workers == 1 && computing == 1 && q->guests == 0 && q->running_large == 1;
   wish->guest = !beside_large;
   wish->big = 0;
   wish->most_cost = wish->most_cost < LARGE ? wish->most_cost : LARGE;
-  return (!q->exclusive || q->isolated) && wish->most_cost >= 0;
+  return (!kept || q->isolated) && wish->most_cost >= 0;
 }
 
-/* Takes what a claimed row says into a job that is in memory already. Id, key, owner and request are the same, and
- * threads that hold the job read them without the lock. */
-static void update_row(job_row *known, const job_row *claimed) {
+/* Takes what a claimed row says into a job that is in memory already. Id, key and owner are the same, and threads that
+ * hold the job read them without the lock. */
+static void update_row(job_row *known, job_row *claimed) {
+  known->request = claimed->request; /* it had none: no worker of this node has the job */
+  claimed->request = NULL;
   known->seq = claimed->seq;
   known->attempt = claimed->attempt;
   known->crashes = claimed->crashes;
@@ -147,7 +152,6 @@ static job *enter(queue *q, job_claim *c) {
   c->row.problem = NULL;
   if (j) {
     update_row(&j->row, &c->row);
-    free(c->row.request);
     free(j->row.problem);
     j->row.problem = NULL;
   } else if ((j = calloc(1, sizeof *j))) {
@@ -163,6 +167,7 @@ static job *enter(queue *q, job_claim *c) {
   j->dependency_problem = problem;
   j->committed = 1;
   j->running = 1;
+  j->alone_until = c->row.alone ? schedule_alone_until(q) : 0;
   j->cancel |= c->cancel;
   j->needs_all = c->big;
   j->ready = c->ready;

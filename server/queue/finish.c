@@ -256,13 +256,14 @@ int queue_needs_memory(queue *q, job *j) {
   return more;
 }
 
-int queue_crashed(queue *q, job *j, int is_sure) {
+int queue_crashed(queue *q, job *j, queue_blame blame) {
   pthread_mutex_lock(&q->lock);
-  int crashes = j->row.crashes + is_sure;
+  const int counts = blame == QUEUE_BLAMED || j->row.attempt >= ATTEMPTS_BORNE;
+  const int crashes = j->row.crashes + counts, suspect = !counts && blame == QUEUE_SUSPECTED;
   pthread_mutex_unlock(&q->lock);
-  store_result stored = catalogue_job_crashed(q->cat, &j->row, is_sure, !is_sure, unix_ms());
+  store_result stored = catalogue_job_crashed(q->cat, &j->row, counts, suspect, unix_ms());
   while (stored == STORE_ERROR && q->shared && shared_pause(q)) {
-    stored = catalogue_job_crashed(q->cat, &j->row, is_sure, !is_sure, unix_ms());
+    stored = catalogue_job_crashed(q->cat, &j->row, counts, suspect, unix_ms());
   }
   if (crashes >= CRASHES_MOST) {
     return 1;
@@ -271,7 +272,8 @@ int queue_crashed(queue *q, job *j, int is_sure) {
   pthread_mutex_lock(&q->lock);
   j->row.state = api_job_ended(j->row.state) ? j->row.state : API_JOB_QUEUED;
   j->row.crashes = crashes;
-  j->row.suspect = !is_sure;
+  j->row.suspect = suspect;
+  j->alone_until = schedule_alone_until(q);
   j->stage[0] = 0;
   if (stored != STORE_OK) { /* the row still says that it runs: the next claim corrects it */
     j->retry_at = orb_clock_ms() + RETRY_AFTER_STORE_MS;
@@ -280,13 +282,6 @@ int queue_crashed(queue *q, job *j, int is_sure) {
   job_unref(j);
   pthread_mutex_unlock(&q->lock);
   return 0;
-}
-
-int queue_runs_alone(queue *q, job *j) {
-  pthread_mutex_lock(&q->lock);
-  int alone = j->row.suspect;
-  pthread_mutex_unlock(&q->lock);
-  return alone;
 }
 
 void queue_put_off(queue *q, job *j) {

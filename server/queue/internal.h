@@ -17,6 +17,13 @@ static const int64_t TRIANGLES_A_MS = 100; /* estimate of a worker's speed, char
 /* How long a job waits in the queue after the store failed to record its end, and after it failed to record its start.
  */
 static const int64_t RETRY_AFTER_STORE_MS = 5000, RETRY_SOON_MS = 1000;
+/* How long a suspect with a process of its own keeps other jobs waiting before it begins, and once it has begun: half a
+ * minute, in which the kernel kills most jobs that need more memory than there is, and in which others wait for an
+ * ordinary job as well. */
+static const int64_t SUSPECT_MS = 30000;
+/* The end of a job's process that is hardly ever its fault counts from this attempt on, which ends a job that takes
+ * each of its nodes, or the process that forks all others, along. */
+enum { ATTEMPTS_BORNE = 20 };
 static const int64_t EVENT_STRIDE = 1000000; /* event numbers of an attempt start above attempt times this */
 
 typedef struct job_event {
@@ -26,7 +33,8 @@ typedef struct job_event {
 } job_event;
 
 struct job {
-  job_row row;
+  job_row row;  /* its request: only while a worker has the job */
+  char *meshes; /* that the request names, one after another; NULL: not known */
   char stage[24];
   double progress, embed_ms;
   int64_t began_ms;     /* when this attempt first reported progress, orb_clock_ms(); 0: it has not */
@@ -45,13 +53,14 @@ struct job {
   char dependencies[DEPENDENCIES][API_ID_SIZE];
   int dependency_count;
   char *dependency_problem;
-  int64_t taken_at; /* by a worker, orb_clock_ms(); 0: by none */
-  int64_t charged;  /* milliseconds that its owner is charged for it since taken_at */
-  int is_guest;     /* see queue.h */
-  int64_t memory;   /* taken from the budget; 0: none */
-  int needs_all;    /* of the memory that jobs may have */
-  int64_t ready;    /* since when it could be taken, Unix time in ms */
-  int64_t retry_at; /* not chosen before this time, orb_clock_ms() */
+  int64_t taken_at;    /* by a worker, orb_clock_ms(); 0: by none */
+  int64_t charged;     /* milliseconds that its owner is charged for it since taken_at */
+  int is_guest;        /* see queue.h */
+  int64_t memory;      /* taken from the budget; 0: none */
+  int needs_all;       /* of the memory that jobs may have */
+  int64_t ready;       /* since when it could be taken, Unix time in ms */
+  int64_t retry_at;    /* not chosen before this time, orb_clock_ms() */
+  int64_t alone_until; /* a suspect: others wait for it until this time, orb_clock_ms() */
   orb_context *ctx;
   int64_t last_event, last_event_ms, stored_event_ms;
   job_event events[EVENTS_KEPT];
@@ -74,9 +83,10 @@ struct queue {
   job *first, *last;
   job *oldest_ended, *newest_ended;
   int ended_count, unfinished, unfinished_fetches;
-  int running, running_large, fetching, exclusive; /* fetching: of those that run */
-  int isolated;                                    /* jobs have processes of their own */
-  int guests;                                      /* of those that run */
+  int running, running_large, fetching; /* fetching: of those that run */
+  const job *alone;                     /* a suspect that runs, and beside which only guests have run; NULL: none */
+  int isolated;                         /* jobs have processes of their own */
+  int guests;                           /* of those that run */
   int stopping, stopping_now, waking;
   budget_claim claim;     /* of a job that a worker waits for */
   struct sharing *shared; /* with other nodes; NULL: this process alone runs the jobs */
@@ -135,6 +145,10 @@ void crash_problem(api_text *text);              /* of a job that crashed alone 
 job *schedule_choose(queue *q, queue_lane lane); /* the next job for a worker, or NULL */
 /* The number of jobs besides this one that could run now. O(unfinished jobs). */
 int schedule_beside(const queue *q, const job *chosen, int64_t now);
+/* Whether jobs that are no guests wait for the suspect that runs. */
+int schedule_is_kept(const queue *q, int64_t now);
+/* Until when others wait for a suspect that is one from now on, or begins now. */
+int64_t schedule_alone_until(const queue *q);
 /* Counts a job that a worker of this lane takes. */
 void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now);
 /* The threads of a job that was entered: its part of the cores. beside: the jobs that could run now as well. */
@@ -151,6 +165,8 @@ void table_ended(queue *q, job *j);
 void table_drop_claim(queue *q);
 job *table_find(queue *q, const char *key, const char *owner); /* an unfinished job, or NULL */
 int table_key_taken(const queue *q, const job *by_other);      /* a worker has another job with the same key */
+/* The ids of the meshes that a request names, one after another, of malloc(); NULL: out of memory. */
+char *meshes_of(const char *request);
 /* A job for a request, in the table, not yet committed, with a reference for the caller; NULL: out of memory. */
 job *job_create(queue *q, const queue_request *request);
 void job_unref(job *j);

@@ -73,6 +73,13 @@ void queue_destroy(queue *q) {
   free(q);
 }
 
+static int find_meshes(const queue *q, job *j) {
+  char *text = catalogue_job_request(q->cat, j->row.id);
+  j->meshes = text ? meshes_of(text) : NULL;
+  free(text);
+  return j->meshes != NULL;
+}
+
 /* Adds a job of the catalogue to the table, unless it is there. Takes ownership of the row. */
 static store_result load(queue *q, job_row *row) {
   job *j = calloc(1, sizeof *j);
@@ -81,9 +88,14 @@ static store_result load(queue *q, job_row *row) {
     return STORE_ERROR;
   }
   j->row = *row;
+  j->alone_until = schedule_alone_until(q);
   j->ready = unix_ms();
   j->refs = 1;
   j->committed = 1;
+  if (!q->shared && !find_meshes(q, j)) { /* else the catalogue is asked for them */
+    job_unref(j);
+    return STORE_ERROR;
+  }
   /* New events continue after the numbers of the stored ones. */
   event_row events[BATCH];
   int64_t after = 0;

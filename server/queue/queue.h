@@ -22,6 +22,9 @@
  * store/recover.c; a lost node counts from the job's 20th attempt on. New requests for work whose processes died
  * CRASHES_MOST times are refused (store/crashes.h).
  *
+ * Memory. The text of a request may be large, so only the catalogue has it: a worker reads it when it takes the job,
+ * and drops it with the job. For the whole queue, memory has what queue_needs_mesh() asks for, the ids of its meshes.
+ *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
  * authoritative: the queue shows a job as accepted, running or ended only after its row was committed, so everything a
  * caller has seen survives a crash. A key (the id of the result) has at most one unfinished job for each owner. A
@@ -38,8 +41,9 @@
  * that it has taken, or an estimate where that is more; when it leaves its worker, the measured time replaces both.
  * Guests: if all workers are busy or their memory is in use, a small job of an owner that runs nothing runs beside
  * them, on one thread. At most QUEUE_GUESTS_MAX guests run at once, within the memory of checks (budget.h). Large jobs
- * never occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died)
- * runs alone; where jobs have processes of their own, guests of other owners run beside it, and do not wait for it.
+ * never occupy all workers: one stays free for small jobs. A suspect (a job that may be why a process died) runs
+ * alone. Where jobs have processes of their own, guests of other owners run beside it, and do not wait for it; all
+ * others wait no longer than SUSPECT_MS until it can begin, and again until it ends. Then it is like any other job.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H
@@ -99,7 +103,7 @@ void queue_wake_all(queue *q);
 /* Wakes every waiter so that it checks its state again. */
 void queue_wake_once(queue *q);
 
-/* A request for a job. queue_submit() copies its strings. */
+/* A request for a job. queue_submit() copies its strings; the text of the request goes to the catalogue only. */
 typedef struct queue_request {
   api_job_kind kind;
   const char *key, *request, *owner;
@@ -108,15 +112,16 @@ typedef struct queue_request {
   int priority, listed;
   int64_t owner_limit; /* of the owner's listed unfinished jobs; 0: no limit */
   int64_t
-      *room; /* bytes that results of the owner may add; NULL: no limit. Becomes those that its unfinished jobs leave */
+      *room; /* bytes that jobs of the owner may add; NULL: no limit. Becomes those that its unfinished jobs leave */
   const struct job_webhook *hook; /* that the request names; NULL: none */
   const char *trace;              /* the span that it belongs to; NULL or "": none */
+  int is_disk_full; /* a new job gets QUEUE_STORE_FULL; not where nodes share a catalogue, which lies elsewhere */
 } queue_request;
 typedef enum queue_result {
   QUEUE_OK,
   QUEUE_FULL,
   QUEUE_QUOTA,
-  QUEUE_ROOM, /* the result has no room */
+  QUEUE_ROOM, /* the request and the result have no room */
   QUEUE_STOPPING,
   QUEUE_STORE_FULL,
   QUEUE_MESH_GONE, /* a mesh that the request names has been deleted */
@@ -124,8 +129,10 @@ typedef enum queue_result {
   QUEUE_WEBHOOKS,  /* the job has as many webhooks as it may have */
   QUEUE_ERROR
 } queue_result;
-/* An estimate of the bytes that a job of this cost stores. */
+/* An estimate of the bytes that the result of a job of this cost has. */
 int64_t queue_bytes_of(int64_t cost);
+/* The bytes that a job needs of its owner's room: of its request until it ends, then of its result. */
+int64_t queue_needs_of(const queue_request *request);
 /* Blocks for the commit. Adds a reference to *out. *fresh (may be NULL): 1 for a new job, 0 for one that existed. */
 queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh);
 
@@ -142,6 +149,7 @@ const char *job_id(const job *j);
 const char *job_key(const job *j);
 api_job_kind job_kind(const job *j);
 const char *job_result(const job *j); /* the id of the result of a job that has succeeded */
+/* The request of a job that a worker has, after queue_read_request(). */
 const char *job_request(const job *j);
 const char *job_charged(const job *j); /* the signing key that its work counts for; "": none */
 const char *job_trace(const job *j);   /* the span of the request; "": none */
@@ -180,6 +188,9 @@ enum { QUEUE_GUESTS_MAX = 4 };
  * of an owner fetch at once. */
 enum { QUEUE_FETCHES_OF_OWNER = 4 };
 int queue_take(queue *q, queue_lane lane, job **out, int *threads);
+/* Reads the request of a taken job, which memory has only as long as a worker has the job. Blocks. 0: it cannot be
+ * read; try later. */
+int queue_read_request(queue *q, job *j);
 /* The bytes of memory that a taken job may use; 0: not limited here. */
 int64_t queue_memory_of(queue *q, job *j);
 /* The taken job needs more memory: returns it, to run with all that jobs may have. Its attempt does not count. 0: it
@@ -221,10 +232,13 @@ void queue_finish_mesh(queue *q, job *j, const char *mesh);
 void queue_put_off(queue *q, job *j);
 /* Returns a taken job; its attempt does not count. */
 void queue_give_back(queue *q, job *j);
-/* The process of a claimed job died. Its attempt counts. Returns 0 if the job is queued again; the worker's reference
- * is released. 1: it has died CRASHES_MOST times; the worker must end it. is_sure: the job alone can be the cause; else
- * it runs alone next time. */
-int queue_crashed(queue *q, job *j, int is_sure);
+/* Whether a job is the cause of the end of its process: no; perhaps, so that it is a suspect next time; or it alone. */
+typedef enum queue_blame { QUEUE_NOT_BLAMED, QUEUE_SUSPECTED, QUEUE_BLAMED } queue_blame;
+/* The process of a claimed job died. Its attempt counts; late ones count as blamed in any case, so that no job repeats
+ * for ever. Returns 0 if the job is queued again; the worker's reference is released. 1: it has died CRASHES_MOST
+ * times; the worker must end it. */
+int queue_crashed(queue *q, job *j, queue_blame blame);
+/* Whether no other job has run on a worker beside this one. */
 int queue_runs_alone(queue *q, job *j);
 
 /* Numbers for /metrics and /readyz?verbose. */

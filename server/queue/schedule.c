@@ -1,4 +1,5 @@
 /* Choosing and claiming a job. */
+#include <stdlib.h>
 
 #include "faults.h"
 #include "queue/internal.h"
@@ -92,15 +93,29 @@ static void claim_memory(queue *q, int64_t now) {
   }
 }
 
+/* Without processes of their own the end of one job is the end of all, so a suspect runs alone as long as it takes. */
+int64_t schedule_alone_until(const queue *q) {
+  return q->isolated ? orb_clock_ms() + SUSPECT_MS : INT64_MAX;
+}
+
+int schedule_is_kept(const queue *q, int64_t now) {
+  return q->alone && now < q->alone->alone_until;
+}
+
+/* Whether others wait for this job. */
+static int keeps(const job *j, int64_t now) {
+  return j->row.suspect && now < j->alone_until;
+}
+
 job *schedule_choose(queue *q, queue_lane lane) {
   int64_t now = orb_clock_ms();
   job *best = NULL;
-  int kept = q->exclusive, may_pass = q->isolated && lane == QUEUE_GUESTS;
-  for (const job *j = q->first; j && !kept; j = j->next) {
-    kept = j->row.suspect && runnable(q, j, now);
-  }
-  if (q->exclusive && !may_pass) {
+  int kept = schedule_is_kept(q, now), may_pass = q->isolated && lane == QUEUE_GUESTS;
+  if (kept && !may_pass) {
     return NULL;
+  }
+  for (const job *j = q->first; j && !kept; j = j->next) {
+    kept = keeps(j, now) && runnable(q, j, now);
   }
   owners_charge(q);
   int share = share_of_owner(q, now);
@@ -109,10 +124,10 @@ job *schedule_choose(queue *q, queue_lane lane) {
       continue;
     }
     int mine = fetches(j) == (lane == QUEUE_FETCHES);
-    if (j->row.suspect && may_pass) {
+    if (keeps(j, now) && may_pass) {
       continue;
     }
-    if (j->row.suspect) { /* alone, so not beside others as a guest */
+    if (keeps(j, now)) { /* alone, so not beside others as a guest */
       const int alone = q->running - (q->isolated ? q->guests : 0) == 0;
       return alone && mine && lane != QUEUE_GUESTS ? j : NULL;
     }
@@ -189,7 +204,12 @@ void schedule_enter(queue *q, queue_lane lane, job *j, int64_t now) {
   j->charged = 0;
   owner_charge(q, j, fetches(j) ? 0 : 10 + j->row.cost / TRIANGLES_A_MS);
   count(q, j, 1);
-  q->exclusive |= j->row.suspect;
+  if (!j->is_guest) { /* another one has waited long enough for the one that is alone */
+    q->alone = keeps(j, now) ? j : NULL;
+  }
+  if (q->alone == j) {
+    j->alone_until = schedule_alone_until(q);
+  }
 }
 
 int schedule_threads(const queue *q, const job *j, int64_t beside) {
@@ -213,8 +233,10 @@ void schedule_leave(queue *q, job *j) {
     budget_give(q->options.memory, j->is_guest ? BUDGET_SMALL : BUDGET_JOBS, j->memory, q);
   }
   j->memory = 0;
-  const int frees_fetches = fetches(j) || (q->exclusive && !j->is_guest);
-  q->exclusive = q->exclusive && j->is_guest;
+  free(j->row.request);
+  j->row.request = NULL;
+  const int frees_fetches = fetches(j) || q->alone == j;
+  q->alone = q->alone == j ? NULL : q->alone;
   j->taken_at = 0;
   j->charged = 0;
   j->is_guest = 0;
@@ -226,6 +248,13 @@ void schedule_leave(queue *q, job *j) {
     shared_look(q, frees_fetches);
   }
   wake_workers(q);
+}
+
+int queue_runs_alone(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  int alone = q->alone == j;
+  pthread_mutex_unlock(&q->lock);
+  return alone;
 }
 
 /* The job runs from now on. Time that it waited, or that an earlier attempt took, does not count for what is left. */
@@ -247,7 +276,7 @@ store_result queue_claim(queue *q, job *j) {
     return STORE_OK;
   }
   FAULT_POINT("before-claim");
-  store_result result = catalogue_job_claim(q->cat, j->row.id, j->row.attempt + 1, j->row.suspect, now);
+  store_result result = catalogue_job_claim(q->cat, j->row.id, j->row.attempt + 1, queue_runs_alone(q, j), now);
   FAULT_POINT("after-claim");
   pthread_mutex_lock(&q->lock);
   if (result == STORE_OK) {
@@ -257,6 +286,17 @@ store_result queue_claim(queue *q, job *j) {
   }
   pthread_mutex_unlock(&q->lock);
   return result;
+}
+
+int queue_read_request(queue *q, job *j) {
+  if (j->row.request) { /* the claim has brought it */
+    return 1;
+  }
+  char *text = catalogue_job_request(q->cat, j->row.id);
+  pthread_mutex_lock(&q->lock);
+  j->row.request = text;
+  pthread_mutex_unlock(&q->lock);
+  return text != NULL;
 }
 
 void queue_show_running(queue *q, job *j) {
@@ -269,7 +309,7 @@ void queue_show_running(queue *q, job *j) {
 void queue_set_context(queue *q, job *j, orb_context *ctx) {
   pthread_mutex_lock(&q->lock);
   j->ctx = ctx;
-  if (ctx && j->cancel) {
+  if (ctx && (j->cancel || q->stopping_now)) { /* what cancels contexts has come before this one */
     orb_context_cancel(ctx);
   }
   pthread_mutex_unlock(&q->lock);

@@ -77,12 +77,8 @@ static void heard(void *user, const char *text) {
   }
 }
 
-/* The loss of a node is hardly ever the fault of a job that has a process of its own, which the kernel limits: nodes
- * are killed, paused or starved. So it counts against the job only from this attempt on, which ends a job that takes
- * each of its nodes along. */
-enum { ATTEMPTS_BORNE = 20 };
-
-/* Queues the jobs of nodes that are gone. Waits for nothing: this thread must renew its own lease. */
+/* Queues the jobs of nodes that are gone. That is hardly ever the fault of a job that has a process of its own, which
+ * the kernel limits: nodes are killed, paused or starved. Waits for nothing: this thread must renew its own lease. */
 static void take_over(queue *q) {
   api_text text = {0};
   crash_problem(&text);

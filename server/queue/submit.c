@@ -7,12 +7,14 @@
 #include "queue/shared.h"
 #include "store/deliveries.h"
 
-/* Whether a result of this owner has room beside those of its unfinished jobs. */
+/* Whether a job of this owner has room beside its unfinished ones. */
 static int has_room(const queue *q, const queue_request *request) {
   for (const job *j = q->first; request->room && j; j = j->next) {
-    *request->room -= !fetches(j) && strcmp(j->row.owner, request->owner) == 0 ? queue_bytes_of(j->row.cost) : 0;
+    if (strcmp(j->row.owner, request->owner) == 0) {
+      *request->room -= j->row.request_bytes + (fetches(j) ? 0 : queue_bytes_of(j->row.cost));
+    }
   }
-  return !request->room || *request->room >= queue_bytes_of(request->cost);
+  return !request->room || *request->room >= queue_needs_of(request);
 }
 
 /* The owner's unfinished job with the same key, with a reference; or NULL, and *mine is the number of the owner's
@@ -48,6 +50,9 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
   }
   if (q->stopping) {
     return QUEUE_STOPPING;
+  }
+  if (request->is_disk_full) {
+    return QUEUE_STORE_FULL;
   }
   if (request->listed && q->unfinished >= q->options.limit) {
     return QUEUE_FULL;
@@ -102,10 +107,13 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
   }
   job *j = *out;
   FAULT_POINT("before-accept");
-  store_result stored = catalogue_job_insert(q->cat, &j->row, request->hook);
+  job_row row = j->row;
+  row.request = (char *)(uintptr_t)request->request;
+  store_result stored = catalogue_job_insert(q->cat, &row, request->hook);
   FAULT_POINT("after-accept");
   pthread_mutex_lock(&q->lock);
   if (stored == STORE_OK) {
+    j->row.seq = row.seq;
     j->committed = 1;
     wake_workers(q); /* only some of those that wait may take it */
   } else {

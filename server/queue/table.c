@@ -21,6 +21,30 @@ int64_t queue_bytes_of(int64_t cost) {
   return BYTES_OF_HEAD + BYTES_OF_TRIANGLE * cost;
 }
 
+int64_t queue_needs_of(const queue_request *request) {
+  return (int64_t)strlen(request->request) + (request->kind == API_JOB_FETCH ? 0 : queue_bytes_of(request->cost));
+}
+
+char *meshes_of(const char *request) {
+  static const char member[] = "\"mesh\":\"";
+  enum { MEMBER = sizeof member - 1, ID = API_ID_SIZE - 1 };
+  size_t count = 0;
+  for (const char *at = request; (at = strstr(at, member)); at += MEMBER) {
+    count++;
+  }
+  char *ids = malloc(count * ID + 1), *to = ids;
+  for (const char *at = request; ids && (at = strstr(at, member));) {
+    at += MEMBER;
+    const size_t length = strnlen(at, ID);
+    memcpy(to, at, length);
+    to += length;
+  }
+  if (ids) {
+    *to = 0;
+  }
+  return ids;
+}
+
 static unsigned bucket(const char *hex) {
   return (unsigned)(keyed_hash(hex, strlen(hex)) % BUCKETS);
 }
@@ -75,14 +99,15 @@ job *table_with_id(const queue *q, const char *id) {
 
 job *job_create(queue *q, const queue_request *request) {
   job *j = calloc(1, sizeof *j);
-  char *text = strdup(request->request);
-  if (!j || !text) {
+  char *meshes = meshes_of(request->request);
+  if (!j || !meshes) {
     free(j);
-    free(text);
+    free(meshes);
     return NULL;
   }
   j->refs = 2; /* one of the table, one of the caller */
-  j->row.request = text;
+  j->meshes = meshes;
+  j->row.request_bytes = (int64_t)strlen(request->request);
   j->row.kind = request->kind;
   j->row.cost = request->cost;
   j->row.priority = request->priority;
@@ -137,6 +162,7 @@ void job_unref(job *j) {
     free(j->events[i].json);
   }
   free(j->dependency_problem);
+  free(j->meshes);
   job_row_free(&j->row);
   free(j);
 }
@@ -235,7 +261,7 @@ int queue_needs_mesh(queue *q, const char *mesh, const char *owner) {
   }
   pthread_mutex_lock(&q->lock);
   for (job *j = q->first; j && !needed; j = j->next) {
-    needed = (!owner || strcmp(j->row.owner, owner) == 0) && strstr(j->row.request, mesh) != NULL;
+    needed = (!owner || strcmp(j->row.owner, owner) == 0) && j->meshes && strstr(j->meshes, mesh) != NULL;
   }
   pthread_mutex_unlock(&q->lock);
   return needed;

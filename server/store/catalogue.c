@@ -323,6 +323,10 @@ int catalogue_is_away(const catalogue *cat) {
   return database_is_url(cat->path) && sql_postgresql_is_away();
 }
 
+int catalogue_is_damaged(const catalogue *cat) {
+  return !database_is_url(cat->path) && sql_sqlite_is_damaged();
+}
+
 int catalogue_is_taken(const catalogue *cat) {
   return database_is_url(cat->path) && sql_postgresql_is_taken();
 }

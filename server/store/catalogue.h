@@ -50,6 +50,8 @@ store_result catalogue_open_shared(const char *where, int shared, catalogue **ou
 int catalogue_is_shared(const catalogue *cat);
 /* Whether it is in PostgreSQL and PostgreSQL does not answer. */
 int catalogue_is_away(const catalogue *cat);
+/* Whether any statement has met a damaged page of the file since the daemon started; PostgreSQL: never. */
+int catalogue_is_damaged(const catalogue *cat);
 /* Whether another daemon has used it since this one opened it: this one must be restarted. */
 int catalogue_is_taken(const catalogue *cat);
 /* Whether it has failed to answer at some time since `since` (orb_clock_ms()). */
@@ -149,7 +151,8 @@ typedef struct catalogue_glance {
 /* STORE_NOT_FOUND: the database has no catalogue yet. Other errors are logged, with the results of catalogue_open(). */
 store_result catalogue_peek(const char *url, catalogue_glance *out);
 
-/* A row of a job. request and problem are allocated with malloc(). */
+/* A row of a job. request and problem are allocated with malloc(). The row keeps the request until the job ends; no
+ * function here reads it but catalogue_job_request() and catalogue_claim_next(). */
 typedef struct job_row {
   int64_t seq;
   char id[API_JOB_ID_SIZE];
@@ -168,6 +171,7 @@ typedef struct job_row {
   char charged[64];         /* the signing key whose limits its work counts against; "": none */
   char result[API_ID_SIZE]; /* of a mesh from a URL that is stored; "": the key is the id of the result */
   char *request, *problem;
+  int64_t request_bytes; /* of the request; they count for the owner. 0: the job has ended */
   int64_t created, started, finished;
 } job_row;
 void job_row_free(job_row *row);
@@ -201,6 +205,8 @@ typedef struct job_end {
  * is no longer the job's current one. */
 store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, const job_end *end);
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out);
+/* The request of an unfinished job, allocated with malloc(); NULL if it cannot be read. */
+char *catalogue_job_request(catalogue *cat, const char *id);
 /* owner NULL, prefix of the id NULL, state −1: any. */
 enum { CATALOGUE_UNFINISHED = -2 }; /* as a state: queued or running */
 int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,

@@ -7,15 +7,19 @@
 #include "store/rows.h"
 #include "store/transactions.h"
 
-/* mesh: of an embedding, first: the first one of a supermesh. */
-#define NOTE(mesh, first)                                                                                     \
+/* mesh: of an embedding; meshes: of a supermesh, separated by commas. */
+#define NOTE(mesh, meshes)                                                                                    \
   "INSERT INTO crash(key, mesh, tenant, count, last) VALUES(?1, CASE WHEN json_valid(?2) THEN coalesce(" mesh \
-  ", " first ", '') ELSE ?1 END, ?3, 1, ?4) ON CONFLICT(key, tenant) DO UPDATE SET count=crash.count+1, last=?4"
+  ", " meshes ", '') ELSE ?1 END, ?3, 1, ?4) ON CONFLICT(key, tenant) DO UPDATE SET count=crash.count+1, last=?4"
 
 int crash_note(database *db, const char *key, const char *request, const char *tenant, int64_t now) {
-  sql_statement *st =
-      database_statement(db, database_either(db, NOTE("?2->>'$.mesh'", "?2->>'$.shapes[0].mesh'"),
-                                             NOTE("?2::json->>'mesh'", "?2::json->'shapes'->0->>'mesh'")));
+  sql_statement *st = database_statement(db, database_either(db,
+                                                             NOTE("?2->>'$.mesh'",
+                                                                  "(SELECT group_concat(DISTINCT value->>'$.mesh')"
+                                                                  " FROM json_each(?2, '$.shapes'))"),
+                                                             NOTE("?2::json->>'mesh'",
+                                                                  "(SELECT string_agg(DISTINCT s->>'mesh', ',')"
+                                                                  " FROM json_array_elements(?2::json->'shapes') s)")));
   if (!st) {
     return SQL_ERROR;
   }
@@ -79,9 +83,12 @@ void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenan
   catalogue_crash_of(cat, mesh, NULL, tenant, now);
 }
 
+/* find: the function that finds a text in another one. A name may be the beginning of any mesh. */
+#define CLEAR(find) \
+  "DELETE FROM crash WHERE tenant=?1 OR substr(key, 1, length(?1))=?1 OR " find "(',' || mesh, ',' || ?1)>0"
+
 static int clear(database *db, void *arg) {
-  sql_statement *st = database_statement(
-      db, "DELETE FROM crash WHERE tenant=?1 OR substr(key, 1, length(?1))=?1 OR substr(mesh, 1, length(?1))=?1");
+  sql_statement *st = database_statement(db, database_either(db, CLEAR("instr"), CLEAR("strpos")));
   if (!st) {
     return SQL_ERROR;
   }

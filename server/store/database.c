@@ -156,6 +156,19 @@ static const char *const migrations[] = {
     " last INTEGER NOT NULL, PRIMARY KEY(key, tenant)) WITHOUT ROWID;"
     "INSERT INTO crash(key, mesh, tenant, count, last) SELECT key, mesh, tenant, count, last FROM old_crash;"
     "DROP TABLE old_crash;",
+    /* The request of a job is kept until it ends, and counts for its owner. */
+    "ALTER TABLE tenant ADD COLUMN requests INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE job ADD COLUMN request_bytes INTEGER NOT NULL DEFAULT 0;"
+    "CREATE TRIGGER job_added AFTER INSERT ON job WHEN NEW.request_bytes>0 BEGIN"
+    " INSERT INTO tenant(name) SELECT NEW.owner WHERE NOT EXISTS(SELECT 1 FROM tenant WHERE name=NEW.owner);"
+    " UPDATE tenant SET requests=requests+NEW.request_bytes WHERE name=NEW.owner; END;"
+    "CREATE TRIGGER job_removed AFTER DELETE ON job WHEN OLD.request_bytes>0 BEGIN"
+    " UPDATE tenant SET requests=requests-OLD.request_bytes WHERE name=OLD.owner; END;"
+    "CREATE TRIGGER job_changed AFTER UPDATE OF request_bytes ON job BEGIN"
+    " UPDATE tenant SET requests=requests+NEW.request_bytes-OLD.request_bytes WHERE name=NEW.owner; END;"
+    "INSERT INTO tenant(name) SELECT DISTINCT owner FROM job WHERE state<2 AND owner NOT IN (SELECT name FROM tenant);"
+    "UPDATE job SET request_bytes=length(CAST(request AS BLOB)) WHERE state<2;"
+    "UPDATE job SET request='{}' WHERE state>=2;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -17,7 +17,7 @@ static int insert_row(database *db, job_row *r) {
   sql_statement *st = database_statement(
       db,
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
-      " charged, trace) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) RETURNING seq");
+      " charged, trace, request_bytes) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) RETURNING seq");
   if (!st) {
     return SQL_ERROR;
   }
@@ -32,6 +32,7 @@ static int insert_row(database *db, job_row *r) {
   sql_bind_integer(st, 9, r->created);
   sql_bind_text(st, 10, r->charged);
   sql_bind_text(st, 11, r->trace);
+  sql_bind_integer(st, 12, (int64_t)strlen(r->request));
   int code = sql_step(st);
   r->seq = code == SQL_ROW ? sql_integer(st, 0) : 0;
   if (code != SQL_ROW) {
@@ -148,7 +149,8 @@ static int finish(database *db, void *arg) {
   const job_end *end = c->end;
   sql_statement *st = database_statement(db,
                                          "UPDATE job SET state=?3, problem=?4, finished=?5, suspect=0, alone=0,"
-                                         " result=?6, started=CASE started WHEN 0 THEN ?7 ELSE started END"
+                                         " result=?6, started=CASE started WHEN 0 THEN ?7 ELSE started END,"
+                                         " request='{}', request_bytes=0"
                                          " WHERE id=?1 AND attempt=?2 AND state<2");
   if (st) {
     sql_bind_text(st, 1, c->id);
@@ -199,15 +201,15 @@ static int read_row(sql_statement *st, void *to) {
   out->priority = sql_int(st, 10);
   out->cost = sql_integer(st, 11);
   row_text(st, 12, out->owner, sizeof out->owner);
-  out->request = row_copy(st, 13);
-  out->problem = row_copy(st, 14);
-  out->created = sql_integer(st, 15);
-  out->started = sql_integer(st, 16);
-  out->finished = sql_integer(st, 17);
-  row_text(st, 18, out->charged, sizeof out->charged);
-  row_text(st, 19, out->result, sizeof out->result);
-  row_text(st, 20, out->trace, sizeof out->trace);
-  return out->request != NULL && !row_lacks(st, 14, out->problem);
+  out->problem = row_copy(st, 13);
+  out->created = sql_integer(st, 14);
+  out->started = sql_integer(st, 15);
+  out->finished = sql_integer(st, 16);
+  row_text(st, 17, out->charged, sizeof out->charged);
+  row_text(st, 18, out->result, sizeof out->result);
+  row_text(st, 19, out->trace, sizeof out->trace);
+  out->request_bytes = sql_integer(st, 20);
+  return !row_lacks(st, 13, out->problem);
 }
 static void release_row(void *row) {
   job_row_free(row);
@@ -222,6 +224,23 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
     sql_bind_text(st, 1, id);
   }
   return rows_one(cat, db, st, &job_rows, out);
+}
+
+static int read_request(sql_statement *st, void *out) {
+  char *text = row_copy(st, 0);
+  *(char **)out = text;
+  return text != NULL;
+}
+
+char *catalogue_job_request(catalogue *cat, const char *id) {
+  static const row_kind requests = {.read = read_request, .size = sizeof(char *)};
+  char *text = NULL;
+  database *db = catalogue_reader(cat);
+  sql_statement *st = database_statement(db, "SELECT request FROM job WHERE id=?1");
+  if (st) {
+    sql_bind_text(st, 1, id);
+  }
+  return rows_one(cat, db, st, &requests, &text) == STORE_OK ? text : NULL;
 }
 
 /* Listed jobs of state ?1 (−1: any, −2: queued or running) with a sequence number below ?2. */

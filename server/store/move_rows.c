@@ -10,10 +10,11 @@
 
 enum { COLUMNS = 40, BATCH = 200, HASH = crypto_hash_sha256_BYTES };
 
-/* The tables in their order, with the columns of the key. tenant: its sums come from the rows of owner. */
+/* The tables in their order, with the columns of the key. tenant: its sums come from the rows of owner
+ * and job. */
 typedef struct table {
   const char *name, *keys[3];
-  const char *skip[3]; /* columns that triggers fill */
+  const char *skip[4]; /* columns that triggers fill */
   const char *conflict;
   int numbered; /* the database numbers new rows itself */
 } table;
@@ -26,7 +27,11 @@ static const struct {
 static const table tables[] = {
     {"resource", {"seq"}, {0}, "", 1},
     {"owner", {"seq"}, {0}, "", 1},
-    {"tenant", {"name"}, {"bytes", "derived"}, " ON CONFLICT(name) DO UPDATE SET worker_ms=excluded.worker_ms", 0},
+    {"tenant",
+     {"name"},
+     {"bytes", "derived", "requests"},
+     " ON CONFLICT(name) DO UPDATE SET worker_ms=excluded.worker_ms",
+     0},
     {"job", {"seq"}, {0}, "", 1},
     {"event", {"job", "number"}, {0}, "", 0},
     {"job_webhook", {"job", "url"}, {0}, "", 0},

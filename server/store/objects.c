@@ -193,6 +193,10 @@ store_result objects_begin(objects *store, object_temp *temp) {
 
 store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
   const char *at = bytes;
+  const objects_remote *remote = &temp->store->remote;
+  if (remote->publish && orb_memory_charge(remote->ctx, size) != ORB_OK) {
+    return STORE_FULL;
+  }
   while (size) {
     ssize_t n = write(temp->fd, at, size);
     if (n < 0 && errno == EINTR) {
@@ -203,7 +207,7 @@ store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
     }
     at += n;
     size -= (size_t)n;
-    if (!temp->store->remote.publish) {
+    if (!remote->publish) {
       FAULT_POINT("temp-written");
     }
   }

@@ -330,6 +330,8 @@ int64_t catalogue_mismatches(catalogue *cat) {
                                          "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name)"
                                          "  OR t.derived !="
                                          "  (SELECT coalesce(sum(o.derived), 0) FROM owner o WHERE o.tenant=t.name))"
+                                         " + (SELECT count(*) FROM tenant t WHERE t.requests !="
+                                         "  (SELECT coalesce(sum(j.request_bytes), 0) FROM job j WHERE j.owner=t.name))"
                                          " + (SELECT count(*) FROM owner o JOIN resource r"
                                          "  ON r.kind=o.kind AND r.id=o.id"
                                          "  WHERE o.derived != iif(r.kind IN (1, 2, 4), r.bytes, 0))"

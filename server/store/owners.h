@@ -42,6 +42,12 @@ store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id
 int catalogue_alignments_of(catalogue *cat, const char *tenant, int limit, char (*ids)[API_ID_SIZE]);
 /* Bytes of the meshes and landmarks that a tenant owns; −1: they cannot be read. */
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant);
+/* Bytes of the largest file that a tenant may send; 0: no limit. A known file costs nothing: it has at most as many
+ * bytes as the tenant stores (used), which may be more than a quota that another of its tokens has, or that was
+ * lowered. */
+static inline int64_t owner_largest_file(int64_t quota, int64_t used) {
+  return quota == 0 || quota > used ? quota : used;
+}
 /* For --check-data: the number of resources without an owner (alignments have none), owners without a resource, stored
  * sums that differ from the sums of the rows, and shapes of supermeshes that the filter of lists lacks or invents; −1:
  * they cannot be read.

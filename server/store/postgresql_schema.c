@@ -292,5 +292,21 @@ const char *const postgresql_migrations[] = {
     "DO $$ BEGIN END $$;",
     /* Each tenant has its own count of a key's deaths. Those so far stay with the tenant of the last one. */
     "ALTER TABLE crash DROP CONSTRAINT crash_pkey, ADD PRIMARY KEY(key, tenant);",
+    /* The request of a job is kept until it ends, and counts for its owner. */
+    "ALTER TABLE tenant ADD COLUMN requests BIGINT NOT NULL DEFAULT 0;"
+    "ALTER TABLE job ADD COLUMN request_bytes BIGINT NOT NULL DEFAULT 0;"
+    "CREATE FUNCTION job_kept() RETURNS TRIGGER LANGUAGE plpgsql AS $$ BEGIN"
+    " IF TG_OP='INSERT' THEN INSERT INTO tenant(name, requests) VALUES(NEW.owner, NEW.request_bytes)"
+    "  ON CONFLICT(name) DO UPDATE SET requests=tenant.requests+NEW.request_bytes;"
+    " ELSIF TG_OP='UPDATE' THEN UPDATE tenant SET requests=requests+NEW.request_bytes-OLD.request_bytes"
+    "  WHERE name=NEW.owner;"
+    " ELSIF OLD.request_bytes>0 THEN UPDATE tenant SET requests=requests-OLD.request_bytes WHERE name=OLD.owner; END "
+    "IF;"
+    " RETURN NULL; END $$;"
+    "CREATE TRIGGER job_kept AFTER INSERT OR DELETE OR UPDATE OF request_bytes ON job FOR EACH ROW"
+    " EXECUTE FUNCTION job_kept();"
+    "INSERT INTO tenant(name) SELECT DISTINCT owner FROM job WHERE state<2 ON CONFLICT DO NOTHING;"
+    "UPDATE job SET request_bytes=octet_length(request) WHERE state<2;"
+    "UPDATE job SET request='{}' WHERE state>=2;",
 };
 const int postgresql_schema = sizeof postgresql_migrations / sizeof postgresql_migrations[0];

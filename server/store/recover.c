@@ -41,7 +41,8 @@ static int give_up(database *db, job_row *row, const recovery *c) {
   code = code == SQL_OK ? delivery_announce(db, row->id, row->state, json.data, c->now) : code;
   api_text_free(&json);
   if (code == SQL_OK) {
-    st = database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3");
+    st = database_statement(
+        db, "UPDATE job SET state=3, problem=?1, finished=?2, request='{}', request_bytes=0 WHERE id=?3");
     if (!st) {
       return SQL_ERROR;
     }

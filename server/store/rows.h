@@ -29,7 +29,7 @@ typedef struct row_kind {
 /* The description that a list shows. A description of landmarks ends with the landmarks, which a list omits. */
 #define ROW_SUMMARY(kind, json) \
   "iif(" kind "=3, substr(" json ", 1, instr(" json ", ',\"landmarks\":')-1)||'}', " json ")"
-/* The columns of a job. */
+/* The columns of a job, but its request, which may be large. */
 #define JOB_COLUMNS JOB_COLUMNS_WITH("state")
 /* The state that callers see where several nodes share the jobs. A job that waits for others is running once one of
  * them runs. A job that a node has claimed only to find out what it must wait for is still queued. */
@@ -38,8 +38,8 @@ typedef struct row_kind {
 #define JOB_COLUMNS_SHOWN JOB_COLUMNS_WITH(JOB_STATE_SHOWN)
 #define JOB_COLUMNS_WITH(state)                                                          \
   "seq, id, key, kind, " state                                                           \
-  ", attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
-  " created, started, finished, charged, result, trace"
+  ", attempt, crashes, suspect, alone, listed, priority, cost, owner, problem, created," \
+  " started, finished, charged, result, trace, request_bytes"
 extern const row_kind job_rows;
 extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created,
                                       * places, quantized, meshopt */

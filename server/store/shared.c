@@ -9,19 +9,21 @@
  * postgresql_schema.c charge it (job_claimed) and replace it (job_used, job_ended). */
 #define ESTIMATE(job) "(10+" job ".cost/100)"
 
-/* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner. Owners with ready jobs, each
- * with the first one that fits, in the order of fairness (queue/queue.h). While a suspect waits, one node keeps its
- * workers. The query looks at the first LOOK_AT jobs of each owner only, and where none of them fits, at the LOOK_AT
- * smallest: a claim that finds none must not read a million. The kind is part of the text, so that each kind uses its
- * own index. */
+/* ?1 node, ?2 fetches, ?3 most cost, ?4 big, ?5 alone, ?6 guest, ?7 downloads of an owner, ?8 alone_ms. Owners with
+ * ready jobs, each with the first one that fits, in the order of fairness (queue/queue.h). While a suspect waits, one
+ * node keeps its workers. The query looks at the first LOOK_AT jobs of each owner only, and where none of them fits, at
+ * the LOOK_AT smallest: a claim that finds none must not read a million. The kind is part of the text, so that each
+ * kind uses its own index. */
 #define LOOK_AT "64"
+/* Whether others wait for a job, which is a suspect. */
+#define KEEPS(job) "(" job ".suspect=1 AND clock_ms()-" job ".ready<?8)"
 #define READY(of_kind) "owner=t.owner AND state=0 AND waits=0 AND " of_kind
-#define FITS(which)                                                                              \
-  "(SELECT j.id, j.priority, j.seq, j.suspect FROM"                                              \
-  "  (SELECT id, key, priority, seq, suspect, cost, big FROM job WHERE " which " LIMIT " LOOK_AT \
-  ") AS j"                                                                                       \
-  "  WHERE j.cost<=?3 AND j.big<=?4 AND j.suspect<=?5"                                           \
-  "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"                        \
+#define FITS(which) \
+  "(SELECT j.id, j.priority, j.seq, j.keeps FROM"                                         \
+  "  (SELECT id, key, priority, seq, " KEEPS("job") "::int AS keeps, cost, big FROM job"  \
+  "   WHERE " which " LIMIT " LOOK_AT ") AS j"                                            \
+  "  WHERE j.cost<=?3 AND j.big<=?4 AND j.keeps<=?5"                                      \
+  "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=j.key AND o.state=1)"                 \
   "  ORDER BY j.priority DESC, j.seq LIMIT 1)"
 #define FIRST(of_kind) FITS(READY(of_kind) " ORDER BY priority DESC, seq")
 #define SMALLEST(of_kind) FITS(READY(of_kind) " AND cost<=?3 ORDER BY cost")
@@ -38,8 +40,8 @@
   "   AND (SELECT sum(computing) FROM busy)>=(SELECT sum(workers) FROM live)))"                                       \
   "  AND (?2=0 OR coalesce(b.fetching, 0)<?7)"                                                                        \
   "  AND (?5=1 OR ?2=1 OR ?6=1 OR ?1<>(SELECT min(name) FROM live)"                                                   \
-  "   OR NOT EXISTS(SELECT 1 FROM job k WHERE k.state=0 AND k.waits=0 AND k.suspect=1))"                              \
-  " ORDER BY next.suspect DESC, next.priority/8 DESC, (coalesce(b.computing, 0)>=s.workers),"                         \
+  "   OR NOT EXISTS(SELECT 1 FROM job k WHERE k.state=0 AND k.waits=0 AND " KEEPS("k") "))"                           \
+  " ORDER BY next.keeps DESC, next.priority/8 DESC, (coalesce(b.computing, 0)>=s.workers),"                           \
   "  t.service+coalesce(b.beyond, 0), next.seq LIMIT 1"
 #define ANY_COST "9223372036854775807"
 /* An owner without a job that is small enough costs one access to the index. The second part of UNION ALL runs only if
@@ -52,7 +54,8 @@ static const char pick_fetching[] = PICK("true", FIRST("kind=2"));
 /* Takes the job ?1, which was picked before the transaction: another node may have claimed it since, or a job with its
  * key. Jobs that wait for it are shown as running from now on. All parts see the sums as they were before. */
 static const char take[] =
-    "WITH taken AS (UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(), alone=suspect,"
+    "WITH taken AS (UPDATE job SET state=1, attempt=attempt+1, node=?2, claimed=clock_ms(),"
+    "  alone=CASE WHEN clock_ms()-ready<?3 THEN suspect ELSE 0 END,"
     "  started=CASE WHEN started=0 AND kind<>1 THEN clock_ms() ELSE started END" /* 1: catalogue_job_begin() */
     "  WHERE id=(SELECT id FROM job WHERE id=?1 AND state=0 AND waits=0 FOR UPDATE SKIP LOCKED LIMIT 1)"
     "  AND NOT EXISTS(SELECT 1 FROM job o WHERE o.key=job.key AND o.state=1) RETURNING *),"
@@ -60,7 +63,8 @@ static const char take[] =
     "  WHERE d.id=n.job AND d.started=0)"
     " SELECT " JOB_COLUMNS
     ", (SELECT coalesce(max(number), 0) FROM event e WHERE e.job=taken.id), big, cancel,"
-    " (SELECT sum(ready)-1 FROM turn), (SELECT coalesce(sum(ready), 0) FROM turn WHERE owner<>taken.owner), ready"
+    " (SELECT sum(ready)-1 FROM turn), (SELECT coalesce(sum(ready), 0) FROM turn WHERE owner<>taken.owner), ready,"
+    " request"
     " FROM taken";
 
 typedef struct claim_arg {
@@ -90,6 +94,7 @@ static int pick_one(database *db, const claim_wish *w, char id[API_JOB_ID_SIZE])
   sql_bind_integer(st, 5, w->alone);
   sql_bind_integer(st, 6, w->guest);
   sql_bind_integer(st, 7, w->fetches_most);
+  sql_bind_integer(st, 8, w->alone_ms);
   return step_text(st, id, API_JOB_ID_SIZE);
 }
 
@@ -112,9 +117,12 @@ static int take_one(database *db, const claim_arg *a, const char *id) {
   }
   sql_bind_text(st, 1, id);
   sql_bind_text(st, 2, a->wish->node);
+  sql_bind_integer(st, 3, a->wish->alone_ms);
   int code = sql_step(st);
   if (code == SQL_ROW) {
     code = job_rows.read(st, &out->row) ? SQL_OK : SQL_NOMEM;
+    out->row.request = row_copy(st, 27);
+    code = out->row.request ? code : SQL_NOMEM;
     out->last_event = sql_integer(st, 21);
     out->big = sql_int(st, 22);
     out->cancel = sql_int(st, 23);
@@ -190,17 +198,19 @@ static int check_limits(database *db, job_submission *s) {
   sql_statement *st = database_statement(
       db,
       "SELECT coalesce(sum(unfinished), 0), coalesce(sum(listed) FILTER (WHERE owner=?1), 0),"
-      " coalesce(sum(computing) FILTER (WHERE owner=?1), 0), coalesce(sum(cost) FILTER (WHERE owner=?1), 0) FROM turn");
+      " coalesce(sum(computing) FILTER (WHERE owner=?1), 0), coalesce(sum(cost) FILTER (WHERE owner=?1), 0),"
+      " coalesce((SELECT requests FROM tenant WHERE name=?1), 0) FROM turn");
   if (!st) {
     return SQL_ERROR;
   }
   sql_bind_text(st, 1, s->row->owner);
   int code = sql_step(st);
   if (code == SQL_ROW) {
-    const int64_t room = s->room ? *s->room - s->head * sql_integer(st, 2) - s->triangle * sql_integer(st, 3) : 0;
+    const int64_t pending = s->head * sql_integer(st, 2) + s->triangle * sql_integer(st, 3) + sql_integer(st, 4);
+    const int64_t room = s->room ? *s->room - pending : 0;
     s->outcome = s->row->listed && sql_integer(st, 0) >= s->limit             ? SUBMIT_FULL
                  : s->owner_limit > 0 && sql_integer(st, 1) >= s->owner_limit ? SUBMIT_QUOTA
-                 : s->room && room < s->head + s->triangle * s->row->cost     ? SUBMIT_ROOM
+                 : s->room && room < s->needs                                 ? SUBMIT_ROOM
                                                                               : SUBMIT_FRESH;
     if (s->outcome == SUBMIT_ROOM || s->outcome == SUBMIT_FRESH) {
       if (s->room) {

@@ -21,6 +21,7 @@ typedef struct claim_wish {
   int64_t most_cost; /* triangles for which this node has memory, and room beside large jobs */
   int big;           /* also a job that needs all memory */
   int alone;         /* also a suspect, because nothing else runs here */
+  int64_t alone_ms;  /* for which others wait for a suspect; after that it is like any other job */
   int guest;         /* only a job of an owner that runs nothing, while all workers of all nodes are busy */
 } claim_wish;
 typedef struct job_claim {
@@ -42,6 +43,7 @@ typedef struct job_submission {
   int64_t limit, owner_limit; /* of unfinished jobs, if the job is listed; of the owner's listed ones, 0: no limit */
   int64_t *room;              /* for results of the owner; NULL: no limit. Becomes what its jobs leave */
   int64_t head, triangle;     /* bytes of a result, and of each of its triangles */
+  int64_t needs;              /* bytes of this job: of its result and its request */
   submit_outcome outcome;
 } job_submission;
 /* Inserts the job unless there is one, in one transaction over all nodes. Results as of catalogue_job_insert(), and

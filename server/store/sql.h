@@ -94,6 +94,8 @@ typedef struct sql_driver {
 } sql_driver;
 
 extern const sql_driver sql_sqlite; /* where: the path of its file */
+/* Whether a statement of this process has met a damaged page, in any file. It stays so until the process ends. */
+int sql_sqlite_is_damaged(void);
 /* where: a URL, postgresql://…. One connection that writes at a time: SQL_BUSY if another process has one. */
 extern const sql_driver sql_postgresql;
 /* Whether the server failed to answer the last attempt to connect; the second function records that. */

@@ -5,6 +5,22 @@
 #include "log.h"
 #include "store/sql.h"
 
+static int is_damaged; /* __atomic */
+
+int sql_sqlite_is_damaged(void) {
+  return __atomic_load_n(&is_damaged, __ATOMIC_ACQUIRE);
+}
+
+/* Logs the first time only, and before others see it: each statement that meets the page comes here. */
+static int found_damage(int code) {
+  static int is_logged; /* __atomic */
+  if (!__atomic_exchange_n(&is_logged, 1, __ATOMIC_RELAXED)) {
+    log_error("the catalogue is damaged: SQLite cannot use a page of it. Stop the daemon and restore a backup");
+  }
+  __atomic_store_n(&is_damaged, 1, __ATOMIC_RELEASE);
+  return code;
+}
+
 static int code_of(int code) {
   switch (code & 0xff) {
     case SQLITE_OK:
@@ -28,9 +44,9 @@ static int code_of(int code) {
     case SQLITE_CANTOPEN:
       return SQL_CANTOPEN;
     case SQLITE_CORRUPT:
-      return SQL_CORRUPT;
+      return found_damage(SQL_CORRUPT);
     case SQLITE_NOTADB:
-      return SQL_NOTADB;
+      return found_damage(SQL_NOTADB);
     default:
       return SQL_ERROR;
   }

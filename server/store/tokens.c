@@ -118,10 +118,11 @@ static int read_row(sql_statement *st, void *out) {
 token_row *catalogue_tokens(catalogue *cat, int *count) {
   static const row_kind kind = {.read = read_row, .size = sizeof(token_row)};
   database *db = catalogue_reader(cat);
-  sql_statement *st = database_statement(db,
-                                         "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
-                                         " quota_jobs, priority, tenant, expires, quota_derived, coalesce(derived, 0)"
-                                         " FROM token"
-                                         " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name");
+  sql_statement *st =
+      database_statement(db,
+                         "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
+                         " quota_jobs, priority, tenant, expires, quota_derived, coalesce(derived+requests, 0)"
+                         " FROM token"
+                         " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name");
   return rows_all(cat, db, st, &kind, count);
 }

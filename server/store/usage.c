@@ -24,7 +24,7 @@ int catalogue_usage(catalogue *cat, const char *own, const char *only, int64_t s
       db,
       "WITH n(name) AS (SELECT name FROM tenant UNION SELECT tenant FROM token UNION SELECT ?1)"
       " SELECT n.name, (SELECT count(*) FROM owner o WHERE o.tenant=n.name AND o.kind=0), coalesce(t.bytes, 0),"
-      "  coalesce(t.derived, 0), coalesce(t.worker_ms, 0),"
+      "  coalesce(t.derived+t.requests, 0), coalesce(t.worker_ms, 0),"
       "  (SELECT coalesce(sum(c.count), 0) FROM crash c WHERE c.tenant=n.name)," LEAST("quota_bytes") "," LEAST(
           "quota_derived") "," LEAST("quota_jobs") " FROM n LEFT JOIN tenant t ON t.name=n.name"
                                                    " WHERE ?2 IS NULL OR n.name=?2 ORDER BY n.name LIMIT ?3 OFFSET ?4");
@@ -39,12 +39,13 @@ int catalogue_usage(catalogue *cat, const char *own, const char *only, int64_t s
 
 int catalogue_usage_most(catalogue *cat, int limit, usage_row *out) {
   database *db = catalogue_reader(cat);
-  sql_statement *st = database_statement(
-      db,
-      "SELECT * FROM (SELECT name, 0, bytes, derived, worker_ms, 0, 0, 0, 0 FROM tenant"
-      " ORDER BY bytes+derived DESC, name LIMIT ?1) AS most"
-      " UNION ALL SELECT '', 0, coalesce(sum(bytes), 0), coalesce(sum(derived), 0), coalesce(sum(worker_ms), 0),"
-      " 0, 0, 0, 0 FROM tenant");
+  sql_statement *st =
+      database_statement(db,
+                         "SELECT * FROM (SELECT name, 0, bytes, derived+requests, worker_ms, 0, 0, 0, 0 FROM tenant"
+                         " ORDER BY bytes+derived+requests DESC, name LIMIT ?1) AS most"
+                         " UNION ALL SELECT '', 0, coalesce(sum(bytes), 0), coalesce(sum(derived+requests), 0), "
+                         "coalesce(sum(worker_ms), 0),"
+                         " 0, 0, 0, 0 FROM tenant");
   if (st) {
     sql_bind_integer(st, 1, limit - 1);
   }

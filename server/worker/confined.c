@@ -88,22 +88,33 @@ static orb_context *make_context(confined *c, job_progress *progress) {
   return orb_context_create(&options, &ctx) == ORB_OK ? ctx : NULL;
 }
 
+/* What a store lacks room for is memory here: the context has the error, as for all other memory. */
+static void explain(const orb_context *ctx, api_problem *problem) {
+  const orb_error *error = orb_context_error(ctx);
+  if (problem->name && strcmp(problem->name, "storage-full") == 0 && error->status == ORB_E_NO_MEMORY) {
+    api_problem_free(problem);
+  }
+  if (!problem->name) {
+    api_problem_of_error(error, problem);
+  }
+}
+
 static _Noreturn void run_job_task(confined *c) {
-  const objects_remote remote = {publish, read_object, c, c->results, c->task.bucket};
   job_progress progress = {.show = show, .user = c};
   run_env env = {.progress = &progress, .get = get, .user = c};
   const run_job task = {c->task.key, c->request, c->task.embed_ms};
   run_output out = {0};
   api_problem problem = {0};
   orb_context *ctx = make_context(c, &progress);
+  const objects_remote remote = {publish, read_object, c, ctx, c->results, c->task.bucket};
   if (!ctx || objects_open_remote(&remote, &env.store) != STORE_OK) {
     _exit(1);
   }
   FAULT_POINT(c->task.key);
   int fine = c->task.kind == TASK_EMBEDDING ? run_embedding(&env, ctx, &task, &out, &problem)
                                             : run_supermesh(&env, ctx, &task, &out, &problem);
-  if (!fine && !problem.name) {
-    api_problem_of_error(orb_context_error(ctx), &problem);
+  if (!fine) {
+    explain(ctx, &problem);
   }
   done_head done = {
       .fine = fine, .gone = out.gone, .flips = out.flips, .bytes = out.row.bytes, .created = out.row.created};
@@ -136,12 +147,12 @@ static void check_one(confined *c, const frame *f) {
 }
 
 _Noreturn static void run_conversion(confined *c, const frame *f) {
-  const objects_remote remote = {publish, read_object, c, c->results, c->task.bucket};
   objects *store;
   api_problem problem = {0};
   done_head done = {0};
   orb_buffer out = {0};
   orb_context *ctx = make_context(c, NULL);
+  const objects_remote remote = {publish, read_object, c, ctx, c->results, c->task.bucket};
   if (!ctx || objects_open_remote(&remote, &store) != STORE_OK) {
     _exit(1);
   }
@@ -150,6 +161,7 @@ _Noreturn static void run_conversion(confined *c, const frame *f) {
   store_result sent = done.fine ? objects_put(store, OBJECT_ASSET, c->task.key, out.data, out.size) : STORE_OK;
   if (sent != STORE_OK) {
     done.fine = task_refuse_store(sent, &problem);
+    explain(ctx, &problem);
   }
   done.bytes = (int64_t)out.size;
   task_end(c->channel, &done, NULL, &problem);
@@ -199,7 +211,7 @@ void confined_work(int channel) {
   confined c = {.channel = channel};
   frame f;
   take_task(&c, &f);
-  c.results = task_confine(&c.task);
+  c.results = task_confine(channel, &c.task);
   if (c.task.kind == TASK_CHECK) {
     run_checks(&c, &f);
   }

@@ -216,14 +216,11 @@ static int take_object(answers *a, const frame *f, run_output *out, api_problem 
 
 /* Whether a result has a description, and as many bytes as its objects, by which quotas count it. */
 static int is_result(const done_head *done, const char *json, const int64_t bytes[OBJECT_KINDS]) {
-  cJSON *description = json ? task_json(json) : NULL;
-  const int is_json = description != NULL;
   int64_t sum = 0;
   for (int kind = 0; kind < OBJECT_KINDS; kind++) {
     sum += bytes[kind];
   }
-  cJSON_Delete(description);
-  return is_json && done->bytes == sum;
+  return done->bytes == sum && json && task_is_object(json);
 }
 
 static int take_done(answers *a, const frame *f, run_output *out, api_problem *problem) {
@@ -308,7 +305,7 @@ static int listen_to(isolated *p, answers *a, run_output *out, api_problem *prob
       return breach(a, "too late after an object");
     }
     if (a->got != CHANNEL_OK) {
-      return a->got == CHANNEL_BAD ? breach(a, ISOLATE_NO_FRAME) : -1;
+      return breach(a, isolate_breach(p, a->got));
     }
     const int over = f.type == FRAME_DONE;
     if (f.type == FRAME_PROGRESS) {
@@ -363,7 +360,7 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
   const int is_made = inputs.rows[0].json != NULL; /* by an earlier attempt, or for another owner */
   if (is_made || !isolate_open(&process, ctx)) {
     let_go(&inputs);
-    return is_made ? 1 : api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
+    return is_made || task_refuse_open(&process, problem);
   }
   open_all(env, &inputs);
   task_head task = {.kind = kind == API_JOB_EMBEDDING ? TASK_EMBEDDING : TASK_SUPERMESH,
@@ -387,7 +384,9 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
                  .lacks = lacks_embedding(&inputs)};
   all.got = send_all(&process, &task, j->request, &inputs);
   let_go(&inputs);
-  int fine = all.got == CHANNEL_OK ? listen_to(&process, &all, out, problem) : -1;
+  /* A process that ends while it still gets inputs has sent its reason before. */
+  const int may_answer = all.got == CHANNEL_OK || all.got == CHANNEL_CLOSED;
+  int fine = may_answer ? listen_to(&process, &all, out, problem) : -1;
   int status = isolate_close(&process);
   if (fine == 0 && problem->name && strcmp(problem->name, "corrupt") == 0) {
     let_go_of_made(env, out);

@@ -19,7 +19,7 @@ enum { ISOLATED_HOLD_MS = 30000 };
 typedef struct isolated_end {
   int died;
   int broke;     /* the daemon ended it because it broke the protocol: no other job can be the cause */
-  int status;    /* as of waitpid(); −1: unknown */
+  int status;    /* as of isolate_close() */
   char why[100]; /* "was killed by signal 11 (Segmentation fault)" */
 } isolated_end;
 

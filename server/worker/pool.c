@@ -2,12 +2,10 @@
 
 #include <pthread.h>
 #include <semaphore.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -21,7 +19,9 @@
 #include "worker/isolated.h"
 #include "worker/spans.h"
 
-enum { FETCHERS = 8 };
+/* PROBLEM_LOOPS: bytes of loops in the problem of a job, which stays in memory and in the catalogue as long as the job.
+ */
+enum { FETCHERS = 8, PROBLEM_LOOPS = 32 << 10 };
 
 typedef struct worker {
   worker_pool *pool;
@@ -151,6 +151,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
     api_problem_of_error(error, problem);
   }
   api_text text = {0};
+  api_problem_shorten(problem, PROBLEM_LOOPS);
   api_problem_write(problem, &text);
   queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data);
   api_text_free(&text);
@@ -248,15 +249,22 @@ static int run_somewhere(worker_pool *pool, const run_env *env, orb_context *ctx
 
 /* The process of the job died. The kernel sends SIGKILL where memory is short, which another job may have caused: such
  * a job runs alone next time, and its crash counts then. A breach of the protocol, for which the daemon sent SIGKILL,
- * counts at once. */
+ * counts at once. Where the zygote ended, no job is the cause: their processes can do nothing to it. */
+static queue_blame blame_of(const run_env *env, job *j, const isolated_end *end) {
+  if (end->broke || (end->status >= 0 && !isolate_was_killed(end->status))) {
+    return QUEUE_BLAMED;
+  }
+  if (end->status == ISOLATE_ORPHAN) {
+    return QUEUE_NOT_BLAMED;
+  }
+  return queue_runs_alone(env->q, j) ? QUEUE_BLAMED : QUEUE_SUSPECTED;
+}
+
 static void crashed(const run_env *env, job *j, const isolated_end *end) {
-  int may_be_memory =
-      !end->broke && (end->status == -1 || (WIFSIGNALED(end->status) && WTERMSIG(end->status) == SIGKILL));
-  int counts = !may_be_memory || queue_runs_alone(env->q, j);
   char fields[128];
   snprintf(fields, sizeof fields, "\"job\":\"%s\"", job_id(j));
   log_write(LOG_ERROR, fields, "the process of the job %s", end->why);
-  if (!queue_crashed(env->q, j, counts)) {
+  if (!queue_crashed(env->q, j, blame_of(env, j, end))) {
     return;
   }
   api_problem problem = {0};
@@ -358,7 +366,7 @@ static void run_one(worker_pool *pool, job *j, int threads) {
     queue_finish(env->q, j, API_JOB_CANCELLED, NULL);
     return;
   }
-  if (objects_are_away(env->store)) {
+  if (objects_are_away(env->store) || !queue_read_request(env->q, j)) {
     queue_put_off(env->q, j);
     return;
   }

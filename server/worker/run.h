@@ -10,6 +10,7 @@
 #include "isolate/task.h"
 #include "net/networks.h"
 #include "queue/queue.h"
+#include "temporary.h"
 #include "worker/progress.h"
 
 typedef struct run_env {
@@ -51,6 +52,7 @@ typedef struct fetch_options {
   int64_t disk_reserve;            /* bytes that it leaves free */
   int64_t check_ms, max_triangles; /* limits on the check */
   memory_budget *memory;           /* of checks */
+  temporary *arriving;             /* counts the temporary files of downloads */
   sem_t *checks;                   /* limits how many check a mesh at once */
 } fetch_options;
 /* Downloads and stores the mesh of a taken job, and claims the job in between. 1 with the mesh; 0 with the problem as

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "api/fetch_codec.h"
+#include "hash.h"
 #include "intake.h"
 #include "net/client.h"
 #include "store/owners.h"
@@ -21,10 +22,17 @@ typedef struct download {
   const fetch_options *options;
   orb_context *ctx;
   object_temp temp;
+  temporary_file takes; /* of the disk, for the job's tenant */
   api_hash hash;
   int64_t size;
+  int64_t largest; /* the most bytes that the quota allows a file, known or not; 0: no quota */
+  temporary_room room;
   store_result stored;
 } download;
+
+static int is_over_quota(const download *d) {
+  return d->largest > 0 && d->size > d->largest;
+}
 
 static int take(void *user, const char *bytes, size_t size) {
   download *d = user;
@@ -32,10 +40,15 @@ static int take(void *user, const char *bytes, size_t size) {
   d->size += (int64_t)size;
   if (d->size / LOOK_BYTES != before) {
     progress_report(d->env->progress, "download", (double)d->size / (double)d->options->most);
-    if (objects_free_bytes(d->env->store) < (uint64_t)d->options->disk_reserve) {
-      d->stored = STORE_FULL;
-      return 0;
-    }
+  }
+  if (is_over_quota(d)) {
+    return 0;
+  }
+  const temporary_limits limits =
+      temporary_limits_of(objects_free_bytes(d->env->store), d->options->disk_reserve, d->largest);
+  d->room = temporary_take(d->options->arriving, &d->takes, (int64_t)size, &limits);
+  if (d->room != TEMPORARY_FREE) {
+    return 0;
   }
   d->stored = objects_append(&d->temp, bytes, size);
   api_hash_add(&d->hash, bytes, size);
@@ -52,8 +65,33 @@ static int refuse_url(const api_fetch_request *wish, const char *name, const cha
   return 0;
 }
 
+static int refuse_over_quota(const api_fetch_request *wish, api_problem *problem) {
+  api_refuse(problem, "quota-exceeded",
+             "The tenant may store %lld bytes of meshes, which leaves no room for this one: delete some meshes, or ask "
+             "the operator for a larger quota.",
+             (long long)wish->quota);
+  api_json_member_integer(&problem->facts, "quota", wish->quota);
+  return 0;
+}
+
+/* Why a download was given up, if that was for want of room. */
+static int refuse_room(const download *d, const api_fetch_request *wish, api_problem *problem) {
+  if (is_over_quota(d)) {
+    return refuse_over_quota(wish, problem);
+  }
+  if (d->room == TEMPORARY_OTHERS) {
+    return api_refuse(problem, "unavailable",
+                      "The tenant's unfinished uploads and downloads hold as many bytes of the server's disk as they "
+                      "may. Request the mesh again when one has ended.");
+  }
+  return task_refuse_store(STORE_FULL, problem);
+}
+
 static int refuse(const download *d, const api_fetch_request *wish, const net_answer *answer, api_problem *problem) {
   char why[64];
+  if (is_over_quota(d) || d->room != TEMPORARY_FREE) {
+    return refuse_room(d, wish, problem);
+  }
   if (d->stored != STORE_OK) {
     task_refuse_store(d->stored, problem);
     return 0;
@@ -78,7 +116,12 @@ static int refuse(const download *d, const api_fetch_request *wish, const net_an
   }
 }
 
-static int get(download *d, const api_fetch_request *wish, api_problem *problem) {
+static int64_t largest_file(const run_env *env, const job *j, const api_fetch_request *wish) {
+  const int64_t used = wish->quota > 0 ? catalogue_tenant_bytes(env->cat, job_owner(j)) : 0;
+  return owner_largest_file(wish->quota, used);
+}
+
+static int get(download *d, const job *j, const api_fetch_request *wish, api_problem *problem) {
   const char *why;
   net_url url;
   net_answer answer = {0};
@@ -91,6 +134,7 @@ static int get(download *d, const api_fetch_request *wish, api_problem *problem)
   if (d->stored != STORE_OK) {
     return refuse(d, wish, &answer, problem);
   }
+  d->largest = largest_file(d->env, j, wish);
   api_hash_begin(&d->hash);
   progress_report(d->env->progress, "download", 0);
   net_get(&(net_request){.url = &url,
@@ -168,12 +212,7 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
   }
   intake_close(&file);
   if (stored == STORE_CONFLICT) {
-    api_refuse(
-        problem, "quota-exceeded",
-        "The tenant may store %lld bytes of meshes, which leaves no room for this one: delete some meshes, or ask "
-        "the operator for a larger quota.",
-        (long long)wish->quota);
-    api_json_member_integer(&problem->facts, "quota", wish->quota);
+    refuse_over_quota(wish, problem);
   } else if (stored != STORE_OK) {
     task_refuse_store(stored, problem);
   }
@@ -182,16 +221,22 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
 
 int run_fetch(const run_env *env, const fetch_options *options, orb_context *ctx, job *j, char mesh[API_ID_SIZE],
               int *claimed, api_problem *problem) {
-  download d = {.env = env, .options = options, .ctx = ctx, .temp.fd = -1};
+  download d = {.env = env,
+                .options = options,
+                .ctx = ctx,
+                .temp.fd = -1,
+                .takes.owner = tenant_hash(job_owner(j)),
+                .room = TEMPORARY_FREE};
   api_fetch_request *wish = malloc(sizeof *wish);
   *claimed = 1;
-  int fine = wish ? api_fetch_request_load(job_request(j), wish, problem) && get(&d, wish, problem)
+  int fine = wish ? api_fetch_request_load(job_request(j), wish, problem) && get(&d, j, wish, problem)
                   : api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   if (fine) {
     *claimed = queue_claim(env->q, j) == STORE_OK;
     fine = *claimed && store(&d, j, wish, mesh, problem);
   }
   objects_abandon(&d.temp);
+  temporary_give(options->arriving, &d.takes);
   free(wish);
   return fine;
 }

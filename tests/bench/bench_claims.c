@@ -169,7 +169,7 @@ int main(int count, char **words) {
   must(catalogue_open_shared(url, 1, &cat) == STORE_OK && bell && notices_connect(bell, &fresh) &&
            notices_renew(bell, node, 4, 3600000) && notices_renew(bell, other_node, 4, 3600000),
        "no node");
-  claim_wish wish = {.node = node, .most_cost = INT64_MAX, .big = 1, .alone = 1, .fetches_most = 4};
+  claim_wish wish = {.node = node, .most_cost = INT64_MAX, .big = 1, .alone = 1, .alone_ms = 60000, .fetches_most = 4};
   double worst = measure_claims(cat, "claim by an idle node", &wish, claims, 1);
   wish.alone = 0; /* it looks for suspects, for which a node keeps its workers */
   double p99 = measure_claims(cat, "claim by a node that runs a job", &wish, claims, 1);

@@ -51,7 +51,8 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
   log_setup(LOG_ERROR, 1);
   srv.options = &options;
   srv.control = -1;
-  if (!srv.memory || !listen_open(&options, options.listen, &srv.at) ||
+  srv.arriving = temporary_create();
+  if (!srv.memory || !srv.arriving || !listen_open(&options, options.listen, &srv.at) ||
       objects_open(options.data, &srv.store) != STORE_OK || catalogue_open(options.data, &srv.cat) != STORE_OK ||
       !add_token() || !(srv.callers = callers_open(srv.cat)) || !(srv.q = queue_create(&queued, srv.cat)) ||
       !(srv.descriptions = cache_create(1 << 20)) || !(srv.io = tasks_start(1, NULL)) ||

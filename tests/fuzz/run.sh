@@ -81,17 +81,19 @@ is_asleep() {
 # counts wall time, for it may wait for a core. Two kinds of inputs are findings then, and SIGABRT makes the fuzzer keep
 # them: one that still runs after HANGS CPU seconds more, once the corpus has been read, and one that sleeps for SLEEPS
 # seconds. The targets themselves abort at an input that costs too much CPU time (cost.h).
-HANGS=60 SLEEPS=1200
+# Inputs may have LONGEST bytes then, instead of 4,096: so work that grows with the square of a file costs more than is
+# allowed.
+HANGS=60 SLEEPS=1200 LONGEST=65536
 one() {
   local name=$1 seconds=$2 unit=$3 log=build-fuzz/corpus/$1.log began=build-fuzz/corpus/$1.began status=0 used=0 limit=$2
-  local fuzzer now runs cov kept times slow=60 until='' asleep=0
+  local fuzzer now runs cov kept times slow=60 longest=0 until='' asleep=0
   mkdir -p "build-fuzz/corpus/$name"
   touch "$began"
-  [ "$unit" = wall ] || limit=0 slow=0
+  [ "$unit" = wall ] || limit=0 slow=0 longest=$LONGEST
   TIMEFORMAT='%R s wall, %U s user, %S s system'
   { time {
       build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -max_total_time="$limit" -rss_limit_mb=2048 -seed="${ORB_FUZZ_SEED:-0}" \
-        -timeout=$slow -report_slow_units=1000000 -print_final_stats=1 \
+        -timeout=$slow -max_len=$longest -report_slow_units=1000000 -print_final_stats=1 \
         -artifact_prefix="build-fuzz/found/$name-" "build-fuzz/corpus/$name" "build-fuzz/seeds/$name" &
       fuzzer=$!
       trap 'kill $fuzzer 2>/dev/null' HUP INT TERM
@@ -189,5 +191,5 @@ if [ $unit = keep ]; then
   exit
 fi
 export -f one cpu_of is_asleep
-export is_stopped HANGS SLEEPS
+export is_stopped HANGS SLEEPS LONGEST
 printf '%s\n' "${targets[@]}" | xargs -P $(($(nproc) + 1)) -I{} bash -c "one {} $amount $unit"

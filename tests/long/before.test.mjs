@@ -70,6 +70,17 @@ test('an asset is not served with a flipped bit', async (t) => {
   assert.ok((await d.get(again.asset)).bytes.equals(right), 'the same request makes it again');
 });
 
+test('sending the right bytes again mends a mesh with a flipped bit', async (t) => {
+  const d = await daemon(t);
+  const text = mesh(0);
+  const { id } = (await d.upload(text)).json;
+  await d.stop();
+  flip(object(d.data, 'mesh', id));
+  await d.start();
+  assert.ok([200, 201].includes((await d.upload(text)).status));
+  assert.equal((await d.get(`/v1/meshes/${id}/file`)).bytes.toString(), text);
+});
+
 /** Uploads 20 meshes, of which a cut WAL loses some rows; returns the texts of those. The daemon runs again. */
 async function loseRows(d) {
   const texts = Array.from({ length: 20 }, (_, k) => mesh(k));

@@ -11,7 +11,7 @@ import { promisify } from 'node:util';
 import { gzipSync } from 'node:zlib';
 import * as attacks from './support/attacks.mjs';
 import { binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
-import { megabytes, ownSeconds, workers, workSeconds } from './support/processes.mjs';
+import { busy, megabytes, ownMegabytes, ownSeconds, workers, workSeconds } from './support/processes.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const all = process.env.ORB_ATTACKS === 'all';
@@ -31,16 +31,6 @@ async function bearer(d, name) {
     d.data,
   ]);
   return { authorization: `Bearer ${stdout.trim()}` };
-}
-
-/** How many times slower a thread is now than alone, because of other work on this machine. */
-function busy() {
-  const [began, before] = [performance.now(), process.cpuUsage()];
-  let used;
-  do {
-    used = process.cpuUsage(before);
-  } while (used.user + used.system < 50_000);
-  return Math.max(1, (1000 * (performance.now() - began)) / (used.user + used.system));
 }
 
 let made = 0;
@@ -245,6 +235,112 @@ test('jobs whose processes die', async (t) => {
   assert.equal((await submit()).status, 500, 'the same work is refused');
 });
 
+/** Connections that send bodies of JSON, with as many values as fit or as are read, and stop before the end. */
+async function stalledBodies(d, headers, count) {
+  const { hostname, port } = new URL(d.url);
+  const bodies = [`[${'1,'.repeat(499_000)}`, `[${'1.23456,'.repeat(124_750)}`];
+  const head =
+    `POST /v1/supermeshes HTTP/1.1\r\nHost: localhost\r\nAuthorization: ${headers.authorization}\r\n` +
+    `Content-Type: application/json\r\nContent-Length: ${bodies[0].length + 2}\r\n\r\n`;
+  const bytes = bodies.map((body) => Buffer.from(head + body));
+  const all = [];
+  for (let i = 0; i < count; i++) {
+    const one = { socket: net.connect(Number(port), hostname), answer: '' };
+    one.socket.on('error', () => {}).on('data', (chunk) => (one.answer += chunk.toString('latin1')));
+    await new Promise((resolve) => one.socket.write(bytes[i % 2], resolve));
+    all.push(one);
+  }
+  return all;
+}
+
+test('bodies of JSON that stall, and end all at once, beside jobs', async (t) => {
+  const { d, evil, other } = await start(t, '--limits', 'off', '--min-rate', '0', '--idle-seconds', '300');
+  await small(d, other);
+  const before = ownMegabytes(d);
+  await beside(t, d, other, async () => {
+    for (let i = 0; i < 2; i++) {
+      const text = shapes.binaryPly(shapes.ball(slow ? 5 : 6, ([x, y, z]) => [x * (1 + 0.01 * i), y, z]));
+      const mesh = await d.post('/v1/meshes', Buffer.from(text), { headers: evil });
+      const job = await d.post('/v1/embeddings', { mesh: mesh.json.id, ...endless }, { headers: evil });
+      assert.equal(job.status, 202, job.bytes.toString());
+    }
+    const bodies = await stalledBodies(d, evil, all ? 600 : 300);
+    const name = Buffer.alloc(300_000, 'x');
+    const large = await d.post('/v1/landmarks', `{"landmarks":"${name}"}`, {
+      headers: { ...other, 'content-type': 'application/json' },
+    });
+    assert.equal(large.status, 422, `the body of another tenant is read: ${large.bytes.toString().slice(0, 300)}`);
+    for (const { socket } of bodies) socket.write('1]');
+    await until(() => bodies.every(({ answer }) => answer.includes('\r\n\r\n')), 'the answers', 60);
+    const refused = bodies.filter(({ answer }) => answer.startsWith('HTTP/1.1 503 '));
+    for (const { answer } of refused) assert.match(answer, /\r\nRetry-After: \d+\r\n/);
+    for (const { answer } of bodies) assert.match(answer, /^HTTP\/1\.1 (503|413|422) /, answer.slice(0, 300));
+    assert.ok(refused.length > bodies.length / 2 && refused.length < bodies.length, `${refused.length} refused`);
+    for (const { socket } of bodies) socket.destroy();
+    return Number.POSITIVE_INFINITY; // jobs are bounded by their seconds, not by bytes
+  });
+  // A heap keeps at most what is free at its end, and pieces between what lives.
+  if (!slow) await until(() => ownMegabytes(d) < before + 25, 'the memory goes back to the system', 10);
+});
+
+/** Opens connections that send these bytes and then nothing. */
+async function stalled(d, bytes, count) {
+  const { hostname, port } = new URL(d.url);
+  const sockets = [];
+  for (let i = 0; i < count; i++) {
+    const socket = net.connect({ port: Number(port), host: hostname });
+    socket.on('error', () => {});
+    sockets.push(socket);
+    const sent = new Promise((resolve) => socket.write(bytes, resolve));
+    if (i % 20 === 0) await sent;
+  }
+  return sockets;
+}
+
+/** What a socket receives until it is closed. */
+const answerOf = (socket) =>
+  new Promise((resolve) => {
+    let text = '';
+    socket.on('data', (chunk) => (text += chunk.toString('latin1')));
+    socket.on('close', () => resolve(text));
+  });
+
+test('thousands of small bodies that stall, then of long targets', { skip: slow }, async (t) => {
+  const [connections, budget, pool] = [3000, 4, 16 / 1024]; // megabytes
+  const { d, evil, other } = await start(
+    t,
+    ...['--limits', 'off', '--min-rate', '0', '--idle-seconds', '300', '--header-seconds', '300'],
+    ...['--request-memory', `${budget}M`, '--encoded-bytes', '0', '--decode-memory', '1M'],
+  );
+  await small(d, other);
+  const before = ownMegabytes(d);
+  const head = `Host: localhost\r\nAuthorization: ${evil.authorization}\r\nContent-Type: application/json\r\n`;
+  const body = `[${'1,'.repeat(5999)}1`; // lacks 5 bytes
+  const floods = [
+    [`POST /v1/supermeshes HTTP/1.1\r\n${head}Content-Length: ${body.length + 5}\r\n\r\n${body}`, ',1,1]'],
+    [`POST /v1/supermeshes?${'x'.repeat(10_000)} HTTP/1.1\r\n${head}X-More: `, ''],
+  ];
+  for (const [bytes, rest] of floods) {
+    await beside(t, d, other, async () => {
+      const sockets = await stalled(d, Buffer.from(bytes), connections);
+      const most = connections * (pool + 3 / 1024) + budget + 8;
+      const used = ownMegabytes(d) - before;
+      t.diagnostic(`${used.toFixed(0)} MB more for ${connections} connections; ${most.toFixed(0)} are allowed`);
+      assert.ok(used < most, `${used} MB`);
+      const last = sockets.slice(-20);
+      const answers = last.map(answerOf);
+      if (rest) for (const socket of last) socket.write(rest);
+      for (const answer of await Promise.all(answers)) {
+        assert.match(answer, /^HTTP\/1\.1 503 /, answer.slice(0, 300));
+        assert.match(answer, /\r\nRetry-After: \d+\r\n/);
+      }
+      for (const socket of sockets) socket.destroy();
+      return Number.POSITIVE_INFINITY; // nothing is read
+    });
+    await until(() => ownMegabytes(d) < before + 15, 'the memory goes back to the system', 10);
+  }
+});
+
 test('requests that two servers could understand differently', async (t) => {
   const { d, other } = await start(t);
   const { hostname, port } = new URL(d.url);
@@ -259,7 +355,7 @@ test('requests that two servers could understand differently', async (t) => {
   const query = Array.from({ length: 250 }, (_, i) => `a${i}=b`).join('&');
   const heads = [
     `GET /v1/meshes?${query} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n`,
-    ...['-1', '+2', '0x2', '2, 2', '99999999999999999999'].map(
+    ...['-1', '+2', '0x2', '2, 2', '2\0', '99999999999999999999'].map(
       (length) => `POST /v1/embeddings HTTP/1.1\r\nHost: localhost\r\nContent-Length: ${length}\r\n\r\n{}`,
     ),
   ];

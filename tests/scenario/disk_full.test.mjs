@@ -2,19 +2,20 @@
 // small file system in memory; it is skipped if mounting is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
-import { closeSync, openSync, statfsSync, unlinkSync, writeSync } from 'node:fs';
+import { closeSync, openSync, readdirSync, statfsSync, statSync, unlinkSync, writeSync } from 'node:fs';
+import http from 'node:http';
 import path from 'node:path';
 import test from 'node:test';
 import { folder, runProgram } from './support/cli.mjs';
-import { assertProblem, binaries, Daemon, daemon } from './support/daemon.mjs';
+import { assertProblem, binaries, Daemon, daemon, until } from './support/daemon.mjs';
 import { memoryDisk } from './support/disk.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** A daemon whose data folder is on a disk in memory; undefined where that cannot be mounted. */
-async function daemonOnDisk(t, size, reserve) {
+async function daemonOnDisk(t, size, reserve, ...more) {
   const disk = memoryDisk(t, size);
   if (!disk) return undefined;
-  const d = new Daemon(path.join(disk.folder, 'data'), ['--disk-reserve', reserve], {});
+  const d = new Daemon(path.join(disk.folder, 'data'), ['--disk-reserve', reserve, ...more], {});
   t.after(async () => {
     if (d.child) await d.stop();
     disk.unmount();
@@ -54,10 +55,10 @@ for (const [reserve, what] of [
     assert.equal((await d.get(`${made.url}/sphere.ply`)).status, 200);
     assert.equal((await d.get('/v1/jobs')).status, 200);
     assert.equal((await d.get('/readyz')).status, 200);
-    // The daemon may still accept a job while the catalogue has room in its log; then the job ends, well or with the
-    // reason.
+    // Without a reserve the daemon may still accept a job while the catalogue has room in its log; then the job ends,
+    // well or with the reason.
     const job = await d.post('/v1/embeddings', { mesh: kept.json.id, method: 'kernel-sampling' });
-    assert.ok([202, 507].includes(job.status), `${job.status} ${job.bytes}`);
+    if (job.status !== 202 || reserve !== '0') assertProblem(job, 507, 'storage-full');
     await new Promise((resolve) => setTimeout(resolve, 500));
 
     unlinkSync(path.join(mount, 'ballast'));
@@ -99,6 +100,134 @@ test('a body of unknown length leaves the reserve free, too', async (t) => {
   assertProblem(await send(96), 507, 'storage-full'); // 24 MB, for which the disk has room
   assertProblem(await send(16), 400, 'malformed-mesh'); // 4 MB are read to the end
   assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
+});
+
+/** Uploads with bodies of unknown length that send so many bytes and then stall. */
+class Stalled {
+  constructor(d, headers, count, bytes) {
+    this.uploads = Array.from({ length: count }, () => {
+      const request = http.request(`${d.url}/v1/meshes`, { method: 'POST', headers, agent: false });
+      const reply = new Promise((resolve) => {
+        request.on('response', async (response) => {
+          const chunks = await response.toArray();
+          const text = Buffer.concat(chunks);
+          const answer = { status: response.statusCode, headers: new Headers(response.headers), bytes: text };
+          resolve({ ...answer, type: response.headers['content-type'], json: JSON.parse(text) });
+        });
+        request.on('error', () => resolve(undefined));
+      });
+      request.flushHeaders();
+      const sent = new Promise((resolve) => request.write(Buffer.alloc(bytes, '# words\n'), resolve));
+      return { request, reply, sent };
+    });
+  }
+  sent() {
+    return Promise.all(this.uploads.map(({ sent }) => sent));
+  }
+  end() {
+    for (const { request } of this.uploads) request.end();
+    return Promise.all(this.uploads.map(({ reply }) => reply));
+  }
+  leave() {
+    for (const { request } of this.uploads) request.destroy();
+  }
+}
+
+/** A daemon for tenants on a disk in memory, of which some 80 MB are free beyond the reserve. */
+async function tenantsOnDisk(t) {
+  const forever = ['--limits', 'off', '--min-rate', '0', '--idle-seconds', '3600'];
+  const on = await daemonOnDisk(t, '96m', '16M', '--auth', 'on', ...forever);
+  if (!on) return undefined;
+  const { d } = on;
+  const add = async (name, ...more) => {
+    const words = ['token', 'add', name, '--scope', 'read,write', ...more, '--data', d.data];
+    return { authorization: `Bearer ${(await runProgram(binaries.daemon, words)).out.trim()}` };
+  };
+  const tmp = path.join(d.data, 'tmp');
+  const sizeOf = (name) => statSync(path.join(tmp, name), { throwIfNoEntry: false })?.size ?? 0;
+  const arriving = () => readdirSync(tmp).reduce((sum, name) => sum + sizeOf(name), 0);
+  const empty = () => until(() => arriving() === 0, 'the temporary files are deleted', 60);
+  const room = () => statfsSync(d.data).bavail * statfsSync(d.data).bsize - (16 << 20);
+  const upload = (headers, text) => d.post('/v1/meshes', Buffer.from(text), { headers });
+  return { d, add, arriving, empty, room, upload };
+}
+/** A mesh whose file has 8 megabytes. */
+const large = (n) => shapes.obj(shapes.ball(2, ([x, y, z]) => [x * (1 + n / 100), y, z])) + '# padding\n'.repeat(8e5);
+
+test('what a tenant sends and does not end is within its quota', async (t) => {
+  const on = await tenantsOnDisk(t);
+  if (!on) return;
+  const { d, add, arriving, empty, upload } = on;
+  const [evil, other] = [await add('evil', '--quota', '1M'), await add('other')];
+  const small = shapes.obj(shapes.ball(2));
+  assert.equal((await upload(evil, small)).status, 201);
+
+  // Announced: refused before it is sent. Known: as before.
+  const announced = await upload(evil, large(0));
+  assertProblem(announced, 429, 'quota-exceeded');
+  assert.equal(announced.json.quota, 1 << 20);
+  assert.equal((await upload(evil, small)).status, 200);
+  await empty();
+
+  // Known to a tenant whose quota is full, or was lowered below it.
+  const full = await add('full', '--quota', String(small.length));
+  assert.equal((await upload(full, small)).status, 201);
+  assert.equal((await upload(full, small)).status, 200);
+  assertProblem(await upload(full, small.replace('v ', 'v  ')), 429, 'quota-exceeded');
+  await runProgram(binaries.daemon, ['token', 'set', 'full', '--quota', '100', '--data', d.data]);
+  assert.equal((await upload(full, small)).status, 200);
+  assertProblem(await upload(full, small.replace('v ', 'v  ')), 429, 'quota-exceeded');
+
+  // Each sends more than its quota, and keeps nothing.
+  const over = new Stalled(d, evil, 2, 5 << 18);
+  await over.sent();
+  await empty();
+  for (const reply of await over.end()) {
+    assertProblem(reply, 429, 'quota-exceeded');
+    assert.equal(reply.json.quota, 1 << 20);
+  }
+
+  // Each sends less, all of them more than twice the quota.
+  const within = new Stalled(d, evil, 40, 3 << 18);
+  await within.sent();
+  await until(() => arriving() === 2 * (3 << 18), 'two of them are kept');
+  assert.equal((await upload(other, large(1))).status, 201);
+  const replies = await within.end();
+  for (const reply of replies.filter(({ status }) => status === 503)) {
+    assertProblem(reply, 503, 'unavailable');
+    assert.ok(Number(reply.headers.get('retry-after')) > 0);
+  }
+  const ends = replies.map(({ status }) => status);
+  assert.deepEqual([ends.filter((s) => s === 400).length, ends.filter((s) => s === 503).length], [2, 38], `${ends}`);
+  await empty();
+});
+
+test('what a tenant sends and does not end takes half of the disk', async (t) => {
+  const on = await tenantsOnDisk(t);
+  if (!on) return;
+  const { d, add, arriving, empty, room, upload } = on;
+  const [greedy, other] = [await add('greedy'), await add('other')];
+  const before = room();
+  const many = new Stalled(d, greedy, 40, 3 << 20);
+  await many.sent();
+  await until(() => arriving() > before / 2 - (4 << 20) && arriving() <= before / 2, `its share of ${before} bytes`);
+  assertProblem(await upload(greedy, large(2)), 503, 'unavailable');
+  assert.equal((await upload(other, large(2))).status, 201, 'another tenant has room');
+  many.leave();
+  await empty();
+  assert.equal((await upload(greedy, large(3))).status, 201, 'clients that are gone give it back');
+
+  // A single file that is too large for its share.
+  const one = new Stalled(d, greedy, 1, Math.floor(room() * 0.75));
+  await one.sent();
+  await empty();
+  const [reply] = await one.end();
+  assertProblem(reply, 507, 'storage-full');
+  const last = new Stalled(d, greedy, 4, 1 << 20);
+  await last.sent();
+  const { code } = await d.stop();
+  assert.equal(code, 0, d.log);
+  last.leave();
 });
 
 /** A mesh whose file has a megabyte. */

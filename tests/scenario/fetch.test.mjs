@@ -83,6 +83,20 @@ test('what cannot be fetched fails with the reason', async (t) => {
   assert.deepEqual((await d.get('/v1/meshes')).json.meshes, [], 'nothing is stored');
 });
 
+test('the problem of a job that fetched a mesh with 2,000 handles is bounded, and counts them all', async (t) => {
+  const d = await daemon(t, { args: allow });
+  const holed = shapes.obj(shapes.grating(40, 50));
+  const { url } = await serve(t, { '/holed.obj': (response) => response.end(holed) });
+  const whole = await d.upload(holed, { name: 'holed' });
+  assertProblem(whole, 422, 'not-genus-zero');
+  assert.equal(whole.json.loops.length, 2000);
+  const problem = await fails(d, `${url}/holed.obj`, 'not-genus-zero', 422);
+  assert.ok(JSON.stringify(problem).length < 33 << 10 && whole.bytes.length > 48 << 10, `${whole.bytes.length} bytes`);
+  assert.deepEqual(problem.loops, whole.json.loops.slice(0, problem.loops.length));
+  assert.equal(problem.loop_lengths_relative.length, problem.loops.length);
+  assert.equal(problem.loops.length + problem.loops_left_out, problem.genus);
+});
+
 test('addresses that are not public are refused, also after a redirect', async (t) => {
   const secret = await origin(t);
   const port = secret.url.split(':').pop();
@@ -136,8 +150,8 @@ test('a request is read strictly', async (t) => {
 });
 
 test('a tenant owns what it has fetched, within its quota', async (t) => {
-  const d = await daemon(t, { args: [...allow, '--auth', 'on'] });
-  const { url } = await serve(t);
+  const d = await daemon(t, { args: [...allow, '--auth', 'on', '--fetch-seconds', '3000'] });
+  const { url } = await serve(t, { '/more': (response) => response.write('# words\n'.repeat(4096)) });
   const token = async (...words) => {
     const ran = await runProgram(binaries.daemon, [
       'token',
@@ -152,8 +166,8 @@ test('a tenant owns what it has fetched, within its quota', async (t) => {
     return { authorization: `Bearer ${ran.out.trim()}` };
   };
   const [ann, bob] = [await token('ann'), await token('bob', '--quota', '100')];
-  const end = async (headers) => {
-    const { json } = await post(d, { url: `${url}/egg.obj` }, { headers });
+  const end = async (headers, file = 'egg.obj') => {
+    const { json } = await post(d, { url: `${url}/${file}` }, { headers });
     let job = json;
     while (job.finished === null) job = (await d.get(job.url, { query: { wait: 20 }, headers })).json;
     return job;
@@ -164,6 +178,9 @@ test('a tenant owns what it has fetched, within its quota', async (t) => {
   assertProblem(await d.get(made.result, { headers: bob }), 404, 'not-found');
   const refused = await end(bob);
   assert.equal(refused.problem.type, '/problems/quota-exceeded');
+  const stalls = await end(bob, 'more');
+  assert.equal(stalls.problem.type, '/problems/quota-exceeded', 'before the download ends');
+  assert.equal(stalls.problem.quota, 100);
   assertProblem(await d.get(made.result, { headers: bob }), 404, 'not-found');
   assert.equal((await d.get(made.result, { headers: ann })).status, 200);
   assertProblem(await post(d, { url: `${url}/egg.obj` }), 401, 'unauthorized');

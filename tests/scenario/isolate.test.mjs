@@ -3,13 +3,14 @@
 import assert from 'node:assert/strict';
 import { execFile, spawn } from 'node:child_process';
 import { readdirSync, readFileSync, readlinkSync } from 'node:fs';
-import { mkdtemp, rm } from 'node:fs/promises';
+import { mkdtemp, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
 import { assertProblem, binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
 import { children, workers } from './support/processes.mjs';
+import { preload } from './support/preload.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const run = promisify(execFile);
@@ -388,6 +389,74 @@ for (const what of ['landlock', 'seccomp'])
     assert.equal(await on.code, 0, on.text);
   });
 
+/** A daemon whose processes cannot be confined while `fails(true)`. */
+async function unconfinable(t, isolate) {
+  const preloaded = preload([process.env.ORB_UNCONFINED_LIBRARY]);
+  const folder = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+  const file = path.join(folder, 'fails');
+  t.after(preloaded.remove);
+  t.after(() => rm(folder, { recursive: true, force: true }));
+  const d = await daemon(t, {
+    args: ['--isolate', isolate, '--workers', '1'],
+    env: { LD_PRELOAD: preloaded.value, ORB_UNCONFINED: file },
+  });
+  const fails = async (wanted) => {
+    await (wanted ? writeFile(file, '') : rm(file, { force: true }));
+    await until(() => workers(d).length === 0, 'processes that were forked before have ended', 20);
+  };
+  return { d, fails };
+}
+const preloads = { skip: !process.env.ORB_UNCONFINED_LIBRARY && 'ORB_UNCONFINED_LIBRARY names no library' };
+
+test(
+  'isolate = strict runs nothing in a process that cannot be confined, also while the daemon runs',
+  preloads,
+  async (t) => {
+    const { d, fails } = await unconfinable(t, 'strict');
+    const { json: mesh, status: code } = await d.upload(shapes.obj(shapes.egg(2)));
+    assert.equal(code, 201);
+    const line = /"level":"error"[^\n]*seccomp missing here[^\n]*isolate = strict does no work without/g;
+    const lines = () => d.log.match(line)?.length ?? 0;
+    const refused = (problem) => {
+      assert.equal(problem.type, '/problems/internal');
+      assert.match(problem.detail, /could not be confined, as isolate = strict demands/);
+    };
+    /** An upload of a small and of a larger file, and a job: none is done. */
+    async function nothing() {
+      for (const levels of [1, 6]) {
+        const before = lines();
+        const reply = await d.upload(shapes.binaryPly(wobble(lines(), levels)));
+        assert.equal(reply.status, 500, reply.bytes.toString());
+        refused(reply.json);
+        await until(() => lines() > before, 'the log says so', 10);
+      }
+      const job = await d.ended((await d.post('/v1/embeddings', { mesh: mesh.id })).json);
+      assert.equal(job.state, 'failed');
+      refused(job.problem);
+    }
+    await fails(true);
+    await nothing();
+    process.kill(children(d.child.pid)[0], 'SIGKILL');
+    await nothing();
+    assert.deepEqual(children(d.child.pid), [], 'a new one that cannot confine is not kept');
+    await fails(false);
+    assert.equal((await d.made('/v1/embeddings', { mesh: mesh.id })).certificate.valid, true);
+    const { stdout } = await run(binaries.daemon, ['crash', 'list', '--data', d.data]);
+    assert.equal(stdout, '', 'which is no crash of the work');
+  },
+);
+
+test('isolate = on says once that processes can no longer be confined, and goes on', preloads, async (t) => {
+  const { d, fails } = await unconfinable(t, 'on');
+  const warned = () => d.log.match(/"level":"warn"[^\n]*seccomp missing here[^\n]*/g)?.length ?? 0;
+  await fails(true);
+  assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
+  await until(() => warned() === 1, 'the log says so', 10);
+  process.kill(children(d.child.pid)[0], 'SIGKILL');
+  assert.equal((await d.upload(shapes.binaryPly(wobble(1, 2)))).status, 201);
+  assert.equal(warned(), 1);
+});
+
 test('a job that needs more than its share of the memory runs again with all of it', async (t) => {
   for (const isolate of ['on', 'off']) {
     const d = await daemon(t, { args: ['--job-memory', '4M', '--isolate', isolate] });
@@ -421,6 +490,26 @@ test('within the service, as isolate = off asks, no process is forked', async (t
   const { json: mesh } = await d.upload(shapes.tetrahedron);
   assert.equal((await d.made('/v1/embeddings', { mesh: mesh.id })).certificate.valid, true);
   assert.deepEqual(children(d.child.pid), []);
+});
+
+test('the end of the process that forks blames no job: all run again at once', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '2'] });
+  const jobs = [(await slowJob(d, 1)).job, (await slowJob(d, 2)).job];
+  for (let attempt = 1; attempt <= 3; attempt++) {
+    await until(
+      async () => {
+        const now = await Promise.all(jobs.map(async (job) => (await d.get(job.url)).json));
+        return now.every((job) => job.stage === 'embed' && job.attempt === attempt);
+      },
+      'both jobs run',
+      60,
+    );
+    if (attempt < 3) process.kill(children(d.child.pid)[0], 'SIGKILL');
+  }
+  assert.match(d.log, /the process of the job ended with the process that forks them all/);
+  const { stdout } = await run(binaries.daemon, ['crash', 'list', '--data', d.data]);
+  assert.equal(stdout, '');
+  for (const job of jobs) assert.equal((await d.delete(job.url)).status, 200);
 });
 
 test('the process that forks is started again', async (t) => {

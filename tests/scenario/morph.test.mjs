@@ -25,6 +25,24 @@ async function animals(d) {
 const plain = (ids) => `/v1/morph.glb?shapes=${ids}&tolerance=0.05`;
 const small = (ids) => `${plain(ids)}&align=rotate`;
 
+// Large JSON is read one at a time. A request that forgot to let others read would stop all of these, and the end too.
+test('a morph by a large set of landmarks leaves room for others', async (t) => {
+  const d = await daemon(t);
+  const ids = await pair(d);
+  const large = Array.from({ length: 150 }, (_, i) => ({
+    name: `${i} ${'x'.repeat(110)}`,
+    at: [{ vertex: i }, { vertex: i }],
+  }));
+  const set = await d.post('/v1/landmarks', { landmarks: large });
+  assert.equal(set.status, 201, set.bytes.toString());
+  const url = (i) => `/v1/morph.glb?shapes=${ids}&landmarks=${set.json.id}&tolerance=0.0${i + 4}&wait=0`;
+  for (let i = 0; i < 3; i++) assertProblem(await d.get(url(i)), 422, 'bad-landmarks'); // the egg has 66 vertices
+  const others = await Promise.all(
+    Array.from({ length: 16 }, () => d.post('/v1/landmarks', { landmarks: 'x'.repeat(20_000) })),
+  );
+  for (const other of others) assert.equal(other.status, 422, other.bytes.toString().slice(0, 300));
+});
+
 test('one request makes a morph that nobody has computed before', async (t) => {
   const d = await daemon(t);
   const url = small(await pair(d));

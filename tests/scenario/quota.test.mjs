@@ -4,11 +4,13 @@ import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import test from 'node:test';
 import { promisify } from 'node:util';
-import { assertProblem, binaries, daemon, endless } from './support/daemon.mjs';
+import { assertProblem, binaries, daemon, endless, slow } from './support/daemon.mjs';
+import { ownMegabytes } from './support/processes.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const QUOTA = 100 << 10;
-const ball = (k) => Buffer.from(shapes.obj(shapes.ball(2, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + k)), y, z])));
+const ball = (k, level = 2) =>
+  Buffer.from(shapes.obj(shapes.ball(level, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + k)), y, z])));
 const vary = (mesh, k) => ({ mesh, method: 'newton', options: { energy_weight: 0.5 + k / 1000 } });
 
 async function tenants(t, ...args) {
@@ -18,7 +20,7 @@ async function tenants(t, ...args) {
   const add = async (name, ...more) => ({
     headers: { authorization: `Bearer ${await token('add', name, '--scope', 'read,write', ...more)}` },
   });
-  const upload = async (who, k) => (await d.post('/v1/meshes', ball(k), who)).json.id;
+  const upload = async (who, k, level) => (await d.post('/v1/meshes', ball(k, level), who)).json.id;
   const embed = async (who, mesh, k, wait = 30) =>
     d.post('/v1/embeddings', vary(mesh, k), { headers: { ...who.headers, prefer: `wait=${wait}` } });
   /** The bytes of all spheres of a tenant: the sum of the lengths of the served files. */
@@ -80,7 +82,7 @@ test('embeddings that only differ in an option are refused after the quota', asy
 test('jobs that have not ended count, so that many requests at once do not pass', async (t) => {
   const { d, add, upload, embed, stored } = await tenants(t, '--quota-derived', '100K', '--workers', '1');
   const [ann, root] = [await add('ann'), await add('root', '--tenant', 'other')];
-  const [mesh, theirs] = [await upload(ann, 1), await upload(root, 3)];
+  const [mesh, theirs] = [await upload(ann, 1), await upload(root, 3, 5)];
   const long = (await d.post('/v1/embeddings', { mesh: theirs, ...endless }, root)).json;
   const replies = await Promise.all(Array.from({ length: 60 }, (_, k) => embed(ann, mesh, k, 0)));
   const jobs = replies.filter((r) => r.status === 202);
@@ -98,6 +100,74 @@ test('jobs that have not ended count, so that many requests at once do not pass'
   assert.equal(count, jobs.length);
   // A job that is ending counts twice for a moment.
   assert.ok(sum <= QUOTA && sum > QUOTA - (4 * sum) / count, `${count} embeddings, ${sum} bytes`);
+});
+
+/** A set of landmarks whose places have about a megabyte, and sixteen tetrahedra that it is for. */
+async function manyLandmarks(d, who) {
+  const shapes_ = [];
+  for (let i = 0; i < 16; i++) {
+    const text = `v 0 0 0\nv ${1 + i / 100} 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n`;
+    shapes_.push({ mesh: (await d.post('/v1/meshes', Buffer.from(text), who)).json.id });
+  }
+  const place = (i, s) => {
+    const [a, b] = [(0.5 * (i + 1)) / 700, (0.4 * (s + 1)) / 17];
+    return { triangle: (i + s) % 4, barycentric: [a, b, 1 - a - b] };
+  };
+  const landmarks = Array.from({ length: 600 }, (_, i) => ({
+    name: `n${i}`,
+    at: Array.from({ length: 16 }, (_, s) => place(i, s)),
+  }));
+  const set = await d.post('/v1/landmarks', { landmarks }, who);
+  assert.equal(set.status, 201, set.bytes.toString().slice(0, 500));
+  return (k) => ({
+    shapes: shapes_,
+    landmarks: { id: set.json.id },
+    remesh: { method: 'adaptive', tolerance: 0.01 + k / 1e6 },
+  });
+}
+
+test('the requests of unfinished jobs count, with the landmarks that they name, and wait in the catalogue', async (t) => {
+  const { d, token, add, upload } = await tenants(t, '--workers', '1', '--limits', 'off', '--drain-seconds', '0');
+  const fresh = ownMegabytes(d, '_Anon');
+  const ann = await add('ann', '--quota', '3M', '--quota-derived', '3M');
+  const derived = async () => (await d.get('/v1/usage', ann)).json.tenants[0].derived_bytes;
+  const wanted = await manyLandmarks(d, ann);
+  const submit = (k) => d.post('/v1/supermeshes', wanted(k), ann);
+  await d.post('/v1/embeddings', { mesh: await upload(ann, 1, 5), ...endless }, ann);
+  const before = await derived();
+  assert.ok(before > 0 && before < 2000, 'the request of the job that runs');
+  const jobs = [];
+  let refused;
+  for (let k = 0; !refused && k < 20; k++) {
+    const reply = await submit(k);
+    if (reply.status === 202) jobs.push(reply.json);
+    else refused = reply;
+  }
+  assertProblem(refused, 429, 'quota-exceeded');
+  assert.match(refused.json.detail, /requests of unfinished jobs/);
+  const each = ((await derived()) - before) / jobs.length;
+  assert.ok(each > 600 * 16 * 50, `${each} bytes a request: triangle and three numbers for each of 600 places of 16`);
+  const other = refused.json.pending - jobs.length * each;
+  assert.ok(other >= before && other < 500e3, `${other} bytes for the job that runs, with its result`);
+  assert.equal(jobs.length, Math.floor(((3 << 20) - other) / each));
+  const full = await derived();
+  assert.match(await token('list'), new RegExp(`^ann .* derived=${full} `, 'm'));
+
+  assert.equal((await d.delete(jobs[0].url, ann)).status, 200);
+  const given = full - (await derived());
+  assert.ok(Math.abs(given - each) < 20, `a cancelled job gives ${given} bytes back`);
+  assert.equal((await submit(0)).status, 202, 'so that another one fits');
+
+  await token('set', 'ann', '--quota-derived', '1G');
+  for (let k = jobs.length; k < (slow ? 6 : 20); k++) assert.equal((await submit(k)).status, 202);
+  const all = await derived();
+  await d.stop();
+  await d.start();
+  assert.equal(await derived(), all, 'a restart forgets none');
+  const more = ownMegabytes(d, '_Anon') - fresh;
+  if (!slow) assert.ok(more < all / 2e6, `and reads none before its job runs: ${more} MB for ${all} bytes`);
+  await d.stop();
+  await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data]);
 });
 
 test('kept alignments count, and give way to results', async (t) => {
@@ -147,8 +217,10 @@ test('usage: what a tenant stores, may store, runs and has used', async (t) => {
   let mine = (await usage(ann)).tenants;
   assert.equal(mine.length, 1, 'only its own');
   const { sum } = await stored(ann);
+  const requests = mine[0].derived_bytes - sum;
+  assert.ok(requests > 2 * mesh.length && requests < 2000, `${requests} bytes of two requests that name the mesh`);
   assert.deepEqual(
-    { ...mine[0], worker_seconds: 0 },
+    { ...mine[0], worker_seconds: 0, derived_bytes: sum },
     {
       tenant: 'ann',
       meshes: 1,

@@ -253,3 +253,29 @@ test('a length that is not a number gets one answer, and the connection ends', a
       assert.equal(Number(head.match(/Content-Length: (\d+)/i)[1]), Buffer.byteLength(body));
     }
 });
+
+test('a header with a NUL gets one answer, and the connection ends', async (t) => {
+  const d = await daemon(t);
+  const { host } = new URL(d.url);
+  const bad = ['Content-Length: 2\0', 'Content-Length: 2\x000', 'Content-Length: 2\0 \0', 'X-Note: a\0b', 'X-Note: \0'];
+  for (const line of bad)
+    for (const lines of [`Host: ${host}\r\n${line}`, `${line}\r\nHost: ${host}`])
+      for (const what of ['POST /v1/embeddings', 'GET /livez']) {
+        const reply = await raw(d, `${what} HTTP/1.1\r\n${lines}\r\n\r\n{}`);
+        const title = JSON.stringify([what, lines, reply]);
+        assert.equal(statusOf(reply), 400, title);
+        assert.equal(reply.split('HTTP/1.1').length, 2, title);
+        assert.match(reply, /^Connection: close\r$/im, title);
+      }
+  // What looks alike is served: empty values, bare line feeds, folded headers.
+  const folded = 'X-Note: a\r\n b\r\n  c';
+  for (const lines of [
+    `Host: ${host}\r\nX-Note:`,
+    `X-Note:\nHost: ${host}\nX: y`,
+    `${folded}\r\nHost: ${host}`,
+    `Host: ${host}\r\n${folded}`,
+  ]) {
+    const reply = await raw(d, `GET /livez HTTP/1.1\r\nConnection: close\r\n${lines}\r\n\r\n`);
+    assert.equal(statusOf(reply), 200, JSON.stringify([lines, reply]));
+  }
+});

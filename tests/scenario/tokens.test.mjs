@@ -184,7 +184,13 @@ test('a token is valid until it expires, and the audit log names who was refused
 
   assertProblem(await d.get('/v1/meshes'), 401, 'unauthorized');
   assertProblem(await d.get('/metrics', bearer(day)), 403, 'forbidden');
+  await assert.rejects(run(d, 'set', 'nobody', '--expires', 'never'));
+  const webhook = (...words) => promisify(execFile)(binaries.daemon, ['webhook', ...words, '--data', d.data]);
+  const { stdout: shown } = await webhook('secret', '--tenant', 'shop');
+  await webhook('list');
   const { id } = (await d.post('/v1/meshes', Buffer.from(shapes.tetrahedron), bearer(root))).json;
+  assert.equal((await d.delete(`/v1/meshes/${id}`, bearer(day))).status, 403);
+  assert.equal((await d.request('PUT', '/v1/no"where', { headers: {} })).status, 401);
   const gone = await d.delete(`/v1/meshes/${id}`, bearer(root));
   assert.equal(gone.status, 204);
   assert.equal((await d.get('/metrics', bearer(root))).status, 200);
@@ -202,6 +208,9 @@ test('a token is valid until it expires, and the audit log names who was refused
   const address = '127.0.0.1';
   has({ audit: 'command', message: 'token add: past' });
   has({ audit: 'command', message: 'token set: soon' });
+  has({ audit: 'command', message: 'token set: nobody, failed' });
+  has({ audit: 'command', message: 'webhook secret: shop' });
+  assert.ok(!lines.some(({ message }) => /list/.test(message)) && !d.log.includes(shown.trim()));
   has({
     audit: 'refused',
     token: 'past',
@@ -212,6 +221,8 @@ test('a token is valid until it expires, and the audit log names who was refused
   });
   has({ audit: 'refused', token: '', address, status: 401 });
   has({ audit: 'refused', token: 'day', address, status: 403, route: '/metrics' });
+  has({ audit: 'refused', token: 'day', status: 403, method: 'DELETE', id });
+  has({ audit: 'refused', status: 401, method: 'PUT', route: '', id: '' });
   has({ audit: 'delete', token: 'root', tenant: 'root', id, address, request: gone.headers.get('x-request-id') });
   has({ audit: 'admin-read', token: 'root', route: '/metrics', address });
   has({ audit: 'admin-read', token: 'root', route: '/readyz', address });

@@ -362,6 +362,154 @@ static void test_loops_left_out(void **state) {
   free(error);
 }
 
+/* The facts of 10,000 handles with loops of four vertices, shortened: what stays is a prefix, and all are counted. */
+static void test_shortened_loops(void **state) {
+  (void)state;
+  enum { HANDLES = 10000, MOST = 3000 };
+  orb_error *error = calloc(1, sizeof *error);
+  error->status = ORB_E_NOT_GENUS_ZERO;
+  error->line = error->offset = error->boundary_loops = -1;
+  error->shape = error->transfer = -1;
+  error->genus = error->loop_count = HANDLES;
+  for (int i = 0; i < HANDLES; i++) {
+    error->loop_start[i + 1] = 4 * (i + 1);
+    error->loop_length_relative[i] = 1.0 / (i + 3);
+    for (int k = 4 * i; k < 4 * (i + 1); k++) {
+      error->loop_vertices[k] = k;
+    }
+  }
+  api_problem problem = {0}, whole = {0};
+  api_problem_of_error(error, &problem);
+  api_problem_of_error(error, &whole);
+  api_problem_shorten(&problem, problem.facts.size);
+  assert_string_equal(problem.facts.data, whole.facts.data);
+  api_problem_shorten(&problem, MOST);
+  assert_false(problem.facts.failed);
+  assert_in_range(problem.facts.size, MOST / 3, MOST + 100);
+  api_text text = {0};
+  api_problem_write(&problem, &text);
+  api_json_error why;
+  cJSON *json = api_json_parse(text.data, text.size, &why);
+  const cJSON *loops = cJSON_GetObjectItemCaseSensitive(json, "loops");
+  const cJSON *lengths = cJSON_GetObjectItemCaseSensitive(json, "loop_lengths_relative");
+  const int kept = cJSON_GetArraySize(loops);
+  assert_in_range(kept, 20, MOST / 13);
+  assert_int_equal(cJSON_GetArraySize(lengths), kept);
+  assert_int_equal(cJSON_GetObjectItemCaseSensitive(json, "loops_left_out")->valueint, HANDLES - kept);
+  assert_int_equal(cJSON_GetObjectItemCaseSensitive(json, "genus")->valueint, HANDLES);
+  const cJSON *last = cJSON_GetArrayItem(loops, kept - 1);
+  assert_int_equal(cJSON_GetArrayItem(last, 3)->valueint, 4 * kept - 1);
+  assert_true(cJSON_GetArrayItem(lengths, kept - 1)->valuedouble == 1.0 / (kept + 2));
+  cJSON_Delete(json);
+  api_text_free(&text);
+  api_problem_free(&problem);
+  api_problem_free(&whole);
+  free(error);
+}
+
+/* A mesh's summary beside lists of any length; what is nested does not count. */
+static void test_summaries(void **state) {
+  (void)state;
+  api_text text = {0};
+  api_mesh_summary summary;
+  api_text_add(&text, " {\"id\":\"x\",\"repairs\":[{\"name\":\"no\",\"loop\":[0");
+  for (int i = 1; i < 100000; i++) {
+    api_text_printf(&text, ",%d", i);
+  }
+  api_text_add(
+      &text,
+      "]}],\"name\" : \"a\\\"]}\\u00e9\",\"format\":\"obj\",\"repair\":\"weld\",\"vertices\":4,\"triangles\":5,"
+      "\"file_vertices\":6,\"topology\":{\"vertices\":9},\"file_triangles\":7 } ");
+  assert_true(api_mesh_summarise(text.data, &summary));
+  assert_string_equal(summary.name, "a\"]}\303\251");
+  assert_string_equal(summary.format, "obj");
+  assert_string_equal(summary.repair, "weld");
+  assert_int_equal(summary.vertices, 4);
+  assert_int_equal(summary.triangles, 5);
+  assert_int_equal(summary.file_vertices, 6);
+  assert_int_equal(summary.file_triangles, 7);
+  api_text_free(&text);
+  assert_false(api_mesh_summarise("{\"name\":\"a\",\"topology\":{\"format\":\"obj\"}}", &summary));
+  assert_false(api_mesh_summarise("[]", &summary));
+  assert_false(api_mesh_summarise("", &summary));
+}
+
+/* Facts as another program could write them. */
+static void test_shortened_texts(void **state) {
+  (void)state;
+  const struct {
+    const char *facts, *shortened; /* NULL: they cannot be shortened */
+  } cases[] = {
+      {"\"genus\":3,\"loops\":[[1,2],[3]],\"loop_lengths_relative\":[0.5,0.25],\"x\":\"]}\\\"\"",
+       "\"genus\":3,\"x\":\"]}\\\"\",\"loops\":[[1,2]],\"loop_lengths_relative\":[0.5],\"loops_left_out\":2"},
+      {" \"loops\" : [ [1] , [2] ] , \"genus\" : 2 , \"loop_lengths_relative\" : [ 1 , 1 ], \"loops_left_out\": 9 ",
+       "\"genus\" : 2,\"loops\":[[1],[2]],\"loop_lengths_relative\":[1,1]"},
+      {"\"loops\":[],\"loop_lengths_relative\":[],\"long\":[1,2,3]",
+       "\"long\":[1,2,3],\"loops\":[],\"loop_lengths_relative\":[]"},
+      {"\"a\":{\"loops\":[[1]]},\"b\":[]", "\"a\":{\"loops\":[[1]]},\"b\":[]"},
+      {"\"loops\":[[1],[2]],\"genus\":2,\"b\":[]", NULL},
+      {"\"loops\":{},\"loop_lengths_relative\":\"a\"", NULL}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    api_problem problem = {0};
+    api_text_add(&problem.facts, cases[i].facts);
+    assert_true(api_json_is_object(problem.facts.data, problem.facts.size, 1, 100));
+    api_problem_shorten(&problem, 14);
+    assert_int_equal(problem.facts.failed, cases[i].shortened == NULL);
+    if (cases[i].shortened) {
+      assert_string_equal(problem.facts.data, cases[i].shortened);
+      assert_true(api_json_is_object(problem.facts.data, problem.facts.size, 1, 100));
+    }
+    api_problem_free(&problem);
+  }
+}
+
+/* What is checked without a tree: objects, and members without braces. */
+static void test_objects(void **state) {
+  (void)state;
+  const struct {
+    const char *text;
+    int bare, most, is;
+  } cases[] = {{"{\"a\":1,\"b\":[2,{\"a\":3,\"a\":4}]}", 0, 7, 1},
+               {"{\"a\":1,\"b\":[2,{\"a\":3,\"a\":4}]}", 0, 6, 0},
+               {" {} ", 0, 1, 1},
+               {"[1]", 0, 9, 0},
+               {"1", 0, 9, 0},
+               {"", 0, 9, 0},
+               {"{\"a\":1,\"b\":2,\"a\":3}", 0, 9, 0},
+               {"{\"a\":1,\"\\u0061\":3}", 0, 9, 0},
+               {"{\"a\":1", 0, 9, 0},
+               {"{\"a\":1}}", 0, 9, 0},
+               {"\"a\":1", 1, 9, 1},
+               {"\"a\":{\"b\":[]} , \"b\":\"}\"", 1, 9, 1},
+               {"\"a\":1,\"a\":2", 1, 9, 0},
+               {"\"a\":1}", 1, 9, 0},
+               {"\"a\":1},{\"b\":1", 1, 9, 0},
+               {"\"a\":{\"b\":1", 1, 9, 0},
+               {"\"a\":1,", 1, 9, 0},
+               {"\"a\"", 1, 9, 0},
+               {"{\"a\":1}", 1, 9, 0},
+               {"1", 1, 9, 0},
+               {"", 1, 9, 0}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    const size_t size = strlen(cases[i].text);
+    if (api_json_is_object(cases[i].text, size, cases[i].bare, (size_t)cases[i].most) != cases[i].is) {
+      fail_msg("%s", cases[i].text);
+    }
+  }
+  for (int names = API_JSON_NAMES; names <= API_JSON_NAMES + 1; names++) {
+    api_text text = {0};
+    api_json_open(&text, '{');
+    for (int i = 0; i < names; i++) {
+      char name[16];
+      snprintf(name, sizeof name, "n%d", i);
+      api_json_member_integer(&text, name, i);
+    }
+    api_json_close(&text, '}');
+    assert_int_equal(api_json_is_object(text.data, text.size, 0, 1000), names == API_JSON_NAMES);
+    api_text_free(&text);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_instants),
                                      cmocka_unit_test(test_integers),
@@ -376,6 +524,10 @@ int main(void) {
                                      cmocka_unit_test(test_stored_meshes),
                                      cmocka_unit_test(test_routes),
                                      cmocka_unit_test(test_output_of_a_program),
-                                     cmocka_unit_test(test_loops_left_out)};
+                                     cmocka_unit_test(test_loops_left_out),
+                                     cmocka_unit_test(test_shortened_loops),
+                                     cmocka_unit_test(test_shortened_texts),
+                                     cmocka_unit_test(test_summaries),
+                                     cmocka_unit_test(test_objects)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -88,7 +88,7 @@ static void not_smaller(void **state) {
     assert_false(encode_bytes(which, noise, sizeof noise, 0, &out, &size));
     assert_false(encode_bytes(which, noise, 0, 0, &out, &size));
   }
-  encoded_cache *c = encoded_open(1 << 20);
+  encoded_cache *c = encoded_open(1 << 20, NULL);
   const encoded *e = encoded_make(c, "noise", CODING_GZIP, noise, sizeof noise);
   assert_non_null(e);
   assert_null(e->bytes);
@@ -102,7 +102,7 @@ static void least_recent_first(void **state) {
   char text[20000], tag[16];
   (void)state;
   memset(text, 'a', sizeof text);
-  encoded_cache *c = encoded_open(2000); /* room for a few */
+  encoded_cache *c = encoded_open(2000, NULL); /* room for a few */
   const encoded *kept = encoded_make(c, "kept", CODING_GZIP, text, sizeof text);
   assert_null(encoded_find(c, "kept", CODING_ZSTD));
   for (int i = 0; i < 50; i++) {

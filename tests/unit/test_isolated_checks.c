@@ -1,6 +1,7 @@
 /* A process that a file has taken over answers a check or a conversion with what no process sends. Each such end counts
  * as a crash of that work. This program is its own zygote. */
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -22,12 +23,20 @@ enum { CRASHES = 3 }; /* after which work is refused */
 
 /* ---- the process ---- */
 
+static const char killed[] = "v 9 9 9\n"; /* the file whose check is killed */
+
 /* A result without what belongs to it. Then it waits until the daemon ends it. */
 static void answer(int channel) {
   frame f;
   done_head done = {.fine = 1};
-  if (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) != CHANNEL_OK ||
-      task_answer(channel, &done, "{}", NULL) != CHANNEL_OK) {
+  if (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) != CHANNEL_OK) {
+    _exit(9);
+  }
+  if (f.size == sizeof(task_head) + sizeof killed - 1 &&
+      memcmp(f.bytes + sizeof(task_head), killed, sizeof killed - 1) == 0) {
+    raise(SIGKILL);
+  }
+  if (task_answer(channel, &done, "{}", NULL) != CHANNEL_OK) {
     _exit(9);
   }
   for (;;) {
@@ -93,29 +102,61 @@ static void expect_crashed(const daemon_state *s, const api_problem *problem) {
   assert_string_equal(problem->name, "job-crashed");
 }
 
+static void open_text(const daemon_state *s, const char *text, object_temp *temp, intake_file *file) {
+  static const api_upload upload = {.name = "a"};
+  const int64_t size = (int64_t)strlen(text);
+  api_hash hash;
+  assert_int_equal(objects_begin(s->store, temp), STORE_OK);
+  assert_int_equal(objects_append(temp, text, (size_t)size), STORE_OK);
+  api_hash_begin(&hash);
+  api_hash_add(&hash, text, (size_t)size);
+  assert_true(intake_open(file, temp, &hash, size, &upload));
+}
+
+static void check(const daemon_state *s, const intake_file *file) {
+  const intake_limits limits = {.memory = 64 << 20, .max_triangles = 1000};
+  intake_stored stored;
+  api_problem problem = {0};
+  assert_int_equal(intake_store(file, s->cat, s->store, s->ctx, &limits, "evil", 0, &stored, &problem), STORE_OK);
+  expect_crashed(s, &problem);
+  api_problem_free(&problem);
+}
+
 static void test_a_check(void **state) {
   const daemon_state *s = *state;
-  static const char text[] = "v 0 0 0\n";
-  const api_upload upload = {.name = "a"};
-  const intake_limits limits = {.memory = 64 << 20, .max_triangles = 1000};
   object_temp temp;
   intake_file file;
-  intake_stored stored;
-  api_hash hash;
-  assert_int_equal(objects_begin(s->store, &temp), STORE_OK);
-  assert_int_equal(objects_append(&temp, text, sizeof text - 1), STORE_OK);
-  api_hash_begin(&hash);
-  api_hash_add(&hash, text, sizeof text - 1);
-  assert_true(intake_open(&file, &temp, &hash, sizeof text - 1, &upload));
+  open_text(s, "v 0 0 0\n", &temp, &file);
   for (int i = 0; i < CRASHES; i++) {
-    api_problem problem = {0};
     assert_false(catalogue_crashed(s->cat, file.id));
-    assert_int_equal(intake_store(&file, s->cat, s->store, s->ctx, &limits, "evil", 0, &stored, &problem), STORE_OK);
-    expect_crashed(s, &problem);
-    api_problem_free(&problem);
+    check(s, &file);
   }
   assert_true(catalogue_crashed(s->cat, file.id));
   expect_log(s, "broke the protocol: an answer that does not fit the check");
+  intake_close(&file);
+  objects_abandon(&temp);
+}
+
+/* Where memory is short the kernel kills a process, and others may have taken the memory: only a check that is killed
+ * while no other process works counts. */
+static void test_a_check_that_is_killed(void **state) {
+  const daemon_state *s = *state;
+  object_temp temp;
+  intake_file file;
+  isolated other;
+  open_text(s, killed, &temp, &file);
+  assert_true(isolate_open(&other, s->ctx));
+  for (int i = 0; i <= CRASHES; i++) {
+    check(s, &file);
+    assert_false(catalogue_crashed(s->cat, file.id));
+  }
+  expect_log(s, "was killed by signal 9");
+  isolate_close(&other);
+  for (int i = 0; i < CRASHES; i++) {
+    assert_false(catalogue_crashed(s->cat, file.id));
+    check(s, &file);
+  }
+  assert_true(catalogue_crashed(s->cat, file.id));
   intake_close(&file);
   objects_abandon(&temp);
 }
@@ -147,6 +188,7 @@ int main(int count, char **arguments) {
   log_setup(LOG_ERROR, 0);
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_a_check, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_check_that_is_killed, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_conversion, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);

@@ -38,7 +38,8 @@ enum {
   KILLED = '7',
   GONE = '8',
   GONE_SPHERE = '9',
-  SLOW = '0'
+  SLOW = '0',
+  HANGS_UP = 'h'
 };
 
 enum { LONG_BYTES = 48 << 20, VALUES = 6 << 20, ALIGNMENT_BYTES = 60 << 20, HOLD_MS = 300 };
@@ -228,6 +229,10 @@ static void evil(int channel) {
       send_slowly(channel, &task);
     case KILLED:
       raise(SIGKILL);
+      break;
+    case HANGS_UP:
+      close(channel);
+      pause();
       break;
     default:
       break;
@@ -466,6 +471,15 @@ static void test_a_process_that_is_killed(void **state) {
   assert_string_equal(end.why, "was killed by signal 9 (Killed)");
 }
 
+/* It is not said to have ended, as if memory were short, so that others would wait while it runs alone. */
+static void test_a_process_that_hangs_up(void **state) {
+  api_problem problem = {0};
+  isolated_end end;
+  assert_false(run(*state, HANGS_UP, &problem, &end));
+  assert_true(end.died && end.broke);
+  assert_string_equal(end.why, "broke the protocol: it closed its channel and went on");
+}
+
 int main(int count, char **arguments) {
   if (count > 1 && strcmp(arguments[1], ISOLATE_FLAG) == 0) {
     isolate_zygote(evil);
@@ -482,6 +496,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test_setup_teardown(test_a_result_that_says_it_has_no_bytes, setup, teardown),
       cmocka_unit_test_setup_teardown(test_an_embedding_that_is_said_to_be_gone, setup, teardown),
       cmocka_unit_test_setup_teardown(test_a_process_that_is_killed, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_process_that_hangs_up, setup, teardown),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
 }

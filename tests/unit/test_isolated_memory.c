@@ -1,5 +1,5 @@
-/* The memory of all processes together, where each takes all of its budget and keeps it. This program is its own
- * zygote, whose processes fill a context of core. ORB_MEMORY_ALL=1 adds a job-memory of 4 GB. */
+/* The memory of all processes together, where each takes all of its budget and keeps it, a part of it as results. This
+ * program is its own zygote, whose processes fill a context of core. ORB_MEMORY_ALL=1 adds a job-memory of 4 GB. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -16,6 +17,8 @@
 #include "isolate/sandbox.h"
 #include "isolate/task.h"
 #include "log.h"
+#include "store/object_removal.h"
+#include "store/objects_remote.h"
 
 enum { PROCESSES = 16 };
 static const int64_t MB = 1 << 20;
@@ -39,7 +42,29 @@ static void fill_heap(orb_context *ctx, size_t most) {
   }
 }
 
-/* Takes what its budget allows, in blocks that core maps and in blocks that malloc() serves, and waits. */
+static store_result publish(void *user, object_kind kind, const char *id, int64_t start, int64_t size) {
+  (void)user, (void)kind, (void)id, (void)start, (void)size;
+  return STORE_OK;
+}
+
+/* Writes results of so many bytes, as far as the budget allows; returns how many are in memory. */
+static int64_t keep_results(orb_context *ctx, int file, int64_t most) {
+  static char part[1 << 20];
+  const objects_remote remote = {.publish = publish, .ctx = ctx, .file = file};
+  objects *store;
+  object_temp temp;
+  struct stat info;
+  if (objects_open_remote(&remote, &store) != STORE_OK || objects_begin(store, &temp) != STORE_OK) {
+    _exit(9);
+  }
+  for (int64_t bytes = 0; bytes < most && objects_append(&temp, part, sizeof part) == STORE_OK;) {
+    bytes += (int64_t)sizeof part;
+  }
+  return fstat(file, &info) == 0 ? (int64_t)info.st_blocks * 512 : INT64_MAX;
+}
+
+/* Takes what its budget allows, up to half of it for results and the rest in blocks that core maps and in blocks that
+ * malloc() serves, and waits. */
 _Noreturn static void fill(int channel) {
   frame f;
   task_head task;
@@ -49,12 +74,13 @@ _Noreturn static void fill(int channel) {
     _exit(9);
   }
   memcpy(&task, f.bytes, sizeof task);
-  task_confine(&task);
+  const int results = task_confine(channel, &task);
   orb_keep_heap();
   if (orb_context_create(&(orb_context_options){.memory_limit = (size_t)task.memory, .threads = 1}, &ctx) != ORB_OK) {
     _exit(9);
   }
   fill_heap(ctx, 100 * (size_t)MB);
+  done.flips = keep_results(ctx, results, task.memory / 2);
   for (size_t block = LARGE; block > 0; block = block == LARGE ? SMALL : 0) {
     for (void *at; (at = orb_alloc(ctx, block, 1)) != NULL;) {
       memset(at, 1, block);
@@ -75,7 +101,8 @@ typedef struct crowd {
   orb_context *ctx;
   isolated all[PROCESSES];
   int count;
-  int64_t bytes; /* in their contexts */
+  int64_t bytes;   /* in their contexts */
+  int64_t results; /* of that, in files */
 } crowd;
 
 /* Starts a process with so many bytes of a part, if there is room. */
@@ -84,7 +111,7 @@ static int join(crowd *c, budget_part part, int64_t bytes) {
   if (c->count == PROCESSES || budget_take(c->budget, part, bytes, NULL) != BUDGET_FREE) {
     return 0;
   }
-  const task_head task = {.threads = 1, .limit = bytes, .memory = bytes, .cpu_seconds = 100};
+  const task_head task = {.kind = TASK_EMBEDDING, .threads = 1, .limit = bytes, .memory = bytes, .cpu_seconds = 100};
   const struct iovec frame_part = {(void *)(uintptr_t)&task, sizeof task};
   frame f;
   done_head done;
@@ -95,7 +122,9 @@ static int join(crowd *c, budget_part part, int64_t bytes) {
   memcpy(&done, f.bytes, sizeof done);
   frame_free(&f);
   assert_in_range(done.bytes, bytes - bytes / 16 - 16384, bytes);
+  assert_in_range(done.flips, bytes / 2 - MB, bytes / 2 + MB);
   c->bytes += done.bytes;
+  c->results += done.flips;
   return 1;
 }
 
@@ -143,7 +172,7 @@ static void measure(int64_t job_memory, int jobs_first) {
   }
   join_all(&c, BUDGET_SMALL, budget_for_densest_file(c.budget, BUDGET_SMALL, BUDGET_SMALL_FILE, 0), 8);
   join_all(&c, BUDGET_SMALL, 64 * MB, 2);
-  const long all = resident(getpid()) / 1024, own = (long)(c.bytes / MB);
+  const long all = resident(getpid()) / 1024 + (long)(c.results / MB), own = (long)(c.bytes / MB);
   print_message("job-memory %ld MB: %d processes with budgets of %ld MB take %ld MB, job-memory and %ld\n",
                 (long)(job_memory / MB), c.count, own, all, all - (long)(job_memory / MB));
   assert_true(own > job_memory / MB);

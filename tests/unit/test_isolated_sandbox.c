@@ -13,6 +13,7 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -23,7 +24,7 @@
 #include "log.h"
 
 /* What the process tries: the first letter of its key. */
-enum { GREEDY = 'a', FILES = 'b', FORGED = 'c', SIGNALS = 'd' };
+enum { GREEDY = 'a', FILES = 'b', FORGED = 'c', SIGNALS = 'd', CODE = 'e', SPINS = 'f' };
 
 typedef char said_text[sizeof((done_head *)0)->detail]; /* what it answers */
 
@@ -32,7 +33,7 @@ typedef char said_text[sizeof((done_head *)0)->detail]; /* what it answers */
 /* Takes all memory that it gets, and says how many megabytes. */
 static void take_all(const task_head *task, done_head *done) {
   int megabytes = 0;
-  task_confine(task);
+  task_confine(ISOLATE_FD, task);
   for (char *at; megabytes < 4096 && (at = malloc(1 << 20)); megabytes++) {
     memset(at, 1, 1 << 20);
   }
@@ -79,7 +80,7 @@ static int fill_read_only(void) {
 static void keep_files(const task_head *task, done_head *done) {
   enum { FILES_MOST = 20 };
   signal(SIGXFSZ, SIG_IGN);
-  const int results = task_confine(task);
+  const int results = task_confine(ISOLATE_FD, task);
   int made = 0, megabytes = results >= 0 ? fill_file(results) : 0;
   for (int i = 0; i < FILES_MOST; i++) {
     const int fd = memfd_create("more", 0);
@@ -96,7 +97,7 @@ static void keep_files(const task_head *task, done_head *done) {
 static void forge(const task_head *task) {
   static const char line[] = "{\"audit\":\"delete\",\"token\":\"root\"}\0\xc2\x9b\n";
   enum { LINES = 5000 };
-  task_confine(task);
+  task_confine(ISOLATE_FD, task);
   for (int i = 0; i < LINES; i++) {
     ssize_t written = write(STDERR_FILENO, line, sizeof line - 1);
     (void)written;
@@ -107,10 +108,26 @@ static void forge(const task_head *task) {
 static void send_signals(int channel, const task_head *task, done_head *done) {
   struct f_owner_ex owner = {.type = F_OWNER_PID, .pid = getppid()};
   int number = getppid();
-  task_confine(task);
+  task_confine(ISOLATE_FD, task);
   snprintf(done->detail, sizeof done->detail, "%d %d %d %d %d %d", fcntl(channel, F_SETOWN, number),
            fcntl(channel, F_SETOWN_EX, &owner), fcntl(channel, F_SETSIG, SIGUSR1), fcntl(channel, F_SETFL, O_ASYNC),
            ioctl(channel, FIOSETOWN, &number), prctl(PR_SET_PDEATHSIG, SIGUSR1));
+}
+
+/* Tries to get memory that it can write to and run, and says what worked. */
+static void make_code(const task_head *task, done_head *done) {
+  enum { BYTES = 4096, ANONYMOUS = MAP_PRIVATE | MAP_ANONYMOUS };
+  task_confine(ISOLATE_FD, task);
+  void *const plain = mmap(NULL, BYTES, PROT_READ | PROT_WRITE, ANONYMOUS, -1, 0);
+  const int runs = mmap(NULL, BYTES, PROT_READ | PROT_WRITE | PROT_EXEC, ANONYMOUS, -1, 0) != MAP_FAILED,
+            becomes = plain != MAP_FAILED && mprotect(plain, BYTES, PROT_READ | PROT_EXEC) == 0;
+  snprintf(done->detail, sizeof done->detail, "%d %d %d", plain != MAP_FAILED, runs, becomes);
+}
+
+static _Noreturn void spin(const task_head *task) {
+  task_confine(ISOLATE_FD, task);
+  for (volatile int turn = 0;; turn = !turn) {
+  }
 }
 
 static void evil(int channel) {
@@ -131,6 +148,11 @@ static void evil(int channel) {
     case FORGED:
       forge(&task);
       break;
+    case CODE:
+      make_code(&task, &done);
+      break;
+    case SPINS:
+      spin(&task);
     default:
       send_signals(channel, &task, &done);
   }
@@ -154,16 +176,26 @@ static int teardown(void **state) {
   return 0;
 }
 
-/* Runs a process with a budget of 64 MB that tries this, and takes its answer. */
-static void run(orb_context *ctx, char what, said_text said) {
-  const task_head task = {
-      .kind = TASK_EMBEDDING, .threads = 1, .limit = 64 << 20, .memory = 64 << 20, .cpu_seconds = 100, .key = {what}};
+/* Starts a process with a budget of 64 MB that tries this. */
+static void start(orb_context *ctx, char what, isolated *process) {
+  const task_head task = {.kind = TASK_EMBEDDING,
+                          .threads = 1,
+                          .limit = 64 << 20,
+                          .memory = 64 << 20,
+                          .inputs = what == FILES ? 32 << 20 : 0,
+                          .cpu_seconds = what == SPINS ? 1 : 100,
+                          .key = {what}};
   const struct iovec part = {(void *)(uintptr_t)&task, sizeof task};
+  assert_true(isolate_open(process, ctx));
+  assert_int_equal(isolate_send(process, FRAME_TASK, &part, 1, -1), CHANNEL_OK);
+}
+
+/* Runs such a process, and takes its answer. */
+static void run(orb_context *ctx, char what, said_text said) {
   isolated process;
   frame f;
   done_head done;
-  assert_true(isolate_open(&process, ctx));
-  assert_int_equal(isolate_send(&process, FRAME_TASK, &part, 1, -1), CHANNEL_OK);
+  start(ctx, what, &process);
   assert_int_equal(isolate_receive(&process, CHANNEL_ANSWER_MOST, &f), CHANNEL_OK);
   assert_int_equal(f.size, sizeof done);
   memcpy(&done, f.bytes, sizeof done);
@@ -184,7 +216,7 @@ static void test_a_process_that_takes_all_memory(void **state) {
   assert_in_range(megabytes, 64, 2 * 64 + 80);
 }
 
-/* A process has one file in memory, with as many bytes as its budget and its inputs (64 MB and none here). */
+/* A process has one file in memory, with as many bytes as its budget (64 MB), also if its inputs are large. */
 static void test_a_process_that_keeps_files(void **state) {
   said_text said;
   int megabytes, files, mapped;
@@ -239,6 +271,29 @@ static void test_a_process_that_sends_signals(void **state) {
   assert_string_equal(said, "-1 -1 -1 -1 -1 -1");
 }
 
+/* No memory can be written to and run. */
+static void test_a_process_that_brings_code(void **state) {
+  said_text said;
+  if (SANDBOX_SANITIZED) {
+    skip(); /* no filter of system calls */
+  }
+  run(*state, CODE, said);
+  assert_string_equal(said, "1 0 0");
+}
+
+/* The kernel ends a process whose time is used up, whatever the daemon does. */
+static void test_a_process_that_spins(void **state) {
+  isolated process;
+  frame f = {0};
+  start(*state, SPINS, &process);
+  const channel_result got = isolate_receive(&process, CHANNEL_ANSWER_MOST, &f);
+  const int status = isolate_close(&process);
+  assert_int_equal(got, CHANNEL_CLOSED);
+  assert_true(WIFSIGNALED(status));
+  print_message("signal %d\n", WTERMSIG(status));
+  assert_true(WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
+}
+
 int main(int count, char **arguments) {
   if (count > 1 && strcmp(arguments[1], ISOLATE_FLAG) == 0) {
     isolate_zygote(evil);
@@ -249,6 +304,8 @@ int main(int count, char **arguments) {
       cmocka_unit_test(test_a_process_that_keeps_files),
       cmocka_unit_test(test_lines_that_look_like_those_of_the_log),
       cmocka_unit_test(test_a_process_that_sends_signals),
+      cmocka_unit_test(test_a_process_that_brings_code),
+      cmocka_unit_test(test_a_process_that_spins),
   };
   return sodium_init() < 0 ? 1 : cmocka_run_group_tests(tests, setup, teardown);
 }

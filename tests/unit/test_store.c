@@ -237,6 +237,26 @@ static void test_crashes_of_tenants(void **state) {
   assert_int_equal(crashes_of(s, "bob"), 0);
 }
 
+/* The death of a supermesh's process is listed with all its meshes, and any of them clears it. */
+static void test_crashes_of_supermeshes(void **state) {
+  stored *s = *state;
+  job_row job = new_job('a');
+  assert_int_equal(catalogue_job_insert(s->cat, &job, NULL), STORE_OK);
+  job.request = (char *)(uintptr_t) "{\"shapes\":[{\"mesh\":\"dab1\"},{\"mesh\":\"cab2\"},{\"mesh\":\"dab1\"}]}";
+  static const char *const names[] = {"dab", "cab2"};
+  for (int i = 0; i < 2; i++) {
+    api_text list = {0};
+    assert_int_equal(catalogue_job_claim(s->cat, job.id, 1 + i, 1, 10), STORE_OK);
+    job.attempt = 1 + i;
+    assert_int_equal(catalogue_job_crashed(s->cat, &job, 1, 0, 20), STORE_OK);
+    assert_int_equal(catalogue_crash_list(s->cat, &list), 1);
+    assert_true(strstr(list.data, " mesh=dab1,cab2 ") || strstr(list.data, " mesh=cab2,dab1 "));
+    api_text_free(&list);
+    assert_int_equal(catalogue_crash_clear(s->cat, "ab"), STORE_NOT_FOUND); /* no mesh begins so */
+    assert_int_equal(catalogue_crash_clear(s->cat, names[i]), STORE_OK);
+  }
+}
+
 /* After a crash, the jobs that ran are queued again as suspects. A job that ran alone in three crashes fails, with a
  * last event. */
 static void test_recovery(void **state) {
@@ -430,6 +450,44 @@ static void test_derived_bytes(void **state) {
   assert_int_equal(catalogue_usage(s->cat, "", NULL, 3, 4, used), 1);
 }
 
+static int64_t derived_of(stored *s, const char *tenant) {
+  usage_row used;
+  assert_int_equal(catalogue_usage(s->cat, tenant, tenant, 0, 1, &used), 1);
+  return used.derived;
+}
+
+/* The request of a job counts for its owner until the job ends; then the row gives it back. */
+static void test_requests_count(void **state) {
+  stored *s = *state;
+  static const char request[] = "{\"landmarks\":\"twenty-nine bytes\"}";
+  job_row jobs[3] = {new_job('1'), new_job('2'), new_job('3')};
+  for (int i = 0; i < 3; i++) {
+    jobs[i].request = (char *)(uintptr_t)request;
+    strcpy(jobs[i].owner, i < 2 ? "ann" : "bob");
+    assert_int_equal(catalogue_job_insert(s->cat, &jobs[i], NULL), STORE_OK);
+  }
+  const int64_t one = (int64_t)strlen(request);
+  assert_int_equal(derived_of(s, "ann"), 2 * one);
+  assert_int_equal(derived_of(s, "bob"), one);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "ann"), 0); /* the queue adds the requests of unfinished jobs */
+  assert_int_equal(catalogue_job_claim(s->cat, jobs[0].id, 1, 0, 10), STORE_OK);
+  reopen(s);
+  char *text = catalogue_job_request(s->cat, jobs[0].id);
+  assert_string_equal(text, request);
+  free(text);
+  const job_end end = {.state = API_JOB_FAILED, .problem = "{}", .now = 50, .owner = "ann"};
+  assert_int_equal(catalogue_job_finish(s->cat, jobs[0].id, 1, &end), STORE_OK);
+  assert_int_equal(derived_of(s, "ann"), one);
+  text = catalogue_job_request(s->cat, jobs[0].id);
+  assert_string_equal(text, "{}");
+  free(text);
+  assert_int_equal(catalogue_jobs_forget(s->cat, 3), STORE_OK);
+  assert_int_equal(derived_of(s, "ann"), one);
+  assert_int_equal(derived_of(s, "bob"), one);
+  assert_int_equal(catalogue_damaged(s->cat), 0);
+  assert_int_equal(catalogue_mismatches(s->cat), 0);
+}
+
 /* A tenant that requests a job owns the meshes that the job names, so their first owner can give them up. A missing
  * mesh refuses the job if a client waits for the answer. */
 static void test_owners_of_meshes(void **state) {
@@ -564,9 +622,11 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_resources, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_attempts, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_crashes_of_tenants, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_crashes_of_supermeshes, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_recovery, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_derived_bytes, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_requests_count, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_results, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_meshes, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_forgetting, stored_setup, stored_teardown),

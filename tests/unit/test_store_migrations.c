@@ -15,6 +15,7 @@
 #include "store/crashes.h"
 #include "store/owners.h"
 #include "store/tokens.h"
+#include "store/usage.h"
 #include "support_store.h"
 
 static int version_of(sqlite3 *db) {
@@ -81,6 +82,8 @@ static void test_migrations(void **state) {
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
       " VALUES('oldmorph', 'key2', 1, 0, 0, 1, 0, 10, '',"
       " '{\"shapes\":[],\"align\":{\"method\":\"pin\",\"options\":{\"preset\":\"fast\",\"seed\":1}}}', 1);"
+      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
+      " VALUES('oldend', 'key3', 0, 3, 1, 1, 0, 10, '', '{\"a\":1}', 1);"
       "INSERT INTO token VALUES('00', 'old', 1, 100, 0, 1);"
       "PRAGMA user_version=1;";
   char path[96];
@@ -97,14 +100,21 @@ static void test_migrations(void **state) {
   assert_int_equal(catalogue_bytes(s->cat, 0), 7);
   assert_int_equal(catalogue_bytes(s->cat, 1), 0);
   assert_int_equal(catalogue_recover(s->cat, 3, 20, "{}"), STORE_OK);
-  job_row old = {0}, waiting = {0};
+  job_row old = {0};
+  usage_row used[2];
+  char *waiting;
   assert_int_equal(catalogue_job_get(s->cat, "oldjob", &old), STORE_OK);
   assert_int_equal(old.state, API_JOB_QUEUED);
   job_row_free(&old);
-  assert_int_equal(catalogue_job_get(s->cat, "oldmorph", &waiting), STORE_OK);
-  assert_string_equal(waiting.request,
-                      "{\"shapes\":[],\"align\":{\"method\":\"pin\",\"options\":{\"preset\":\"fast\"}}}");
-  job_row_free(&waiting);
+  waiting = catalogue_job_request(s->cat, "oldmorph");
+  assert_string_equal(waiting, "{\"shapes\":[],\"align\":{\"method\":\"pin\",\"options\":{\"preset\":\"fast\"}}}");
+  assert_int_equal(catalogue_usage(s->cat, "", "", 0, 2, used), 1); /* the requests of waiting jobs count */
+  assert_int_equal(used[0].derived, strlen(waiting) + strlen("{}"));
+  assert_int_equal(catalogue_mismatches(s->cat), 0);
+  free(waiting);
+  waiting = catalogue_job_request(s->cat, "oldend"); /* that of one that has ended is dropped */
+  assert_string_equal(waiting, "{}");
+  free(waiting);
   token_row *tokens = catalogue_tokens(s->cat, &count);
   assert_int_equal(count, 1);
   assert_string_equal(tokens[0].name, "old");
@@ -228,8 +238,10 @@ static void test_migration_of_crashes(void **state) {
   s->cat = NULL;
   snprintf(path, sizeof path, "%s/catalogue.sqlite", s->data);
   assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-  assert_int_equal(version_of(db), BEFORE_TENANTS + 1);
+  assert_int_equal(version_of(db), BEFORE_TENANTS + 2);
   assert_int_equal(sqlite3_exec(db,
+                                "DROP TRIGGER job_added; DROP TRIGGER job_removed; DROP TRIGGER job_changed;"
+                                "ALTER TABLE job DROP COLUMN request_bytes; ALTER TABLE tenant DROP COLUMN requests;"
                                 "DROP TABLE crash;"
                                 "CREATE TABLE crash(key TEXT PRIMARY KEY, mesh TEXT NOT NULL, tenant TEXT NOT NULL,"
                                 " count INTEGER NOT NULL, last INTEGER NOT NULL) WITHOUT ROWID;"

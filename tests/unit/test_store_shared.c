@@ -32,7 +32,8 @@ static submit_outcome submit(nodes *n, int node, const char *owner, char key, in
 }
 
 static store_result claim_costing(nodes *n, int node, int64_t most, job_claim *out) {
-  const claim_wish wish = {.node = node_names[node], .most_cost = most, .big = 1, .alone = 1, .fetches_most = 4};
+  const claim_wish wish = {
+      .node = node_names[node], .most_cost = most, .big = 1, .alone = 1, .alone_ms = 60000, .fetches_most = 4};
   store_result result = catalogue_claim_next(n->cat[node], &wish, out);
   if (result == STORE_OK) {
     free(out->row.request);
@@ -190,10 +191,28 @@ static void test_limits(void **state) {
   s = (job_submission){.row = &row, .limit = 9, .owner_limit = 1};
   assert_int_equal(catalogue_job_submit(n->cat[1], &s), STORE_OK);
   assert_int_equal(s.outcome, SUBMIT_QUOTA);
-  s = (job_submission){.row = &row, .limit = 9, .room = &room, .head = 40, .triangle = 40}; /* 40 + 12 * 40 each */
+  /* 40 + 12 * 40 each, and two bytes of request */
+  s = (job_submission){.row = &row, .limit = 9, .room = &room, .head = 40, .triangle = 40, .needs = 522};
   assert_int_equal(catalogue_job_submit(n->cat[1], &s), STORE_OK);
   assert_int_equal(s.outcome, SUBMIT_ROOM);
-  assert_int_equal(room, 480);
+  assert_int_equal(room, 478);
+  room = 1044;
+  api_random_id(row.id);
+  assert_int_equal(catalogue_job_submit(n->cat[1], &s), STORE_OK);
+  assert_int_equal(s.outcome, SUBMIT_FRESH);
+}
+
+/* A suspect waits for a node that runs nothing else only for so long, and then runs beside others. */
+static void expect_suspect_for_a_time(nodes *n) {
+  claim_wish wish = {.node = node_names[1], .most_cost = INT64_MAX, .big = 1, .alone_ms = 60000, .fetches_most = 4};
+  job_claim c;
+  assert_int_equal(catalogue_claim_next(n->cat[1], &wish, &c), STORE_NOT_FOUND);
+  wish.alone_ms = 0;
+  assert_int_equal(catalogue_claim_next(n->cat[1], &wish, &c), STORE_OK);
+  assert_int_equal(c.row.suspect, 1);
+  assert_int_equal(c.row.alone, 0);
+  assert_int_equal(catalogue_job_release(n->cat[1], c.row.id, c.row.attempt), STORE_OK);
+  job_row_free(&c.row);
 }
 
 /* If a node is silent beyond its lease, another node runs its jobs; the first one can then neither end nor release
@@ -211,6 +230,7 @@ static void test_lease(void **state) {
   }
   catalogue_recover_lost(n->cat[1], 3, 1, 7, "{}");
   assert_int_equal(catalogue_job_cancel(n->cat[1], "none"), STORE_OK); /* waits for that write */
+  expect_suspect_for_a_time(n);
   assert_int_equal(claim(n, 1, &taken), STORE_OK);
   assert_string_equal(taken.row.id, row.id);
   assert_int_equal(taken.row.attempt, 2);

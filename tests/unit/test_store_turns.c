@@ -1,5 +1,6 @@
 /* Whose job runs next: owners are charged for the measured time of workers, not for the size of their meshes. The clock
- * of a running job is set back to stand for elapsed time. */
+ * stands while a test has a store, so that slow writes charge nobody. The start of a running job is set back to stand
+ * for elapsed time. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,6 +16,23 @@
 #include "tasks.h"
 
 enum { SMALL = 1000, SECOND = 1000 };
+
+int64_t __real_orb_clock_ms(void), __wrap_orb_clock_ms(void); /* --wrap */
+static int64_t stands_at;                                     /* 0: the clock runs */
+
+int64_t __wrap_orb_clock_ms(void) {
+  return stands_at ? stands_at : __real_orb_clock_ms();
+}
+
+static int setup(void **state) {
+  stands_at = __real_orb_clock_ms();
+  return stored_setup(state);
+}
+
+static int teardown(void **state) {
+  stands_at = 0;
+  return stored_teardown(state);
+}
 
 static queue *open_queue(const stored *s, int workers) {
   const queue_options options = {.workers = workers, .cores = workers, .limit = 1000};
@@ -170,6 +188,22 @@ static void test_given_back(void **state) {
   queue_destroy(q);
 }
 
+/* A worker has taken a job, and has no context for it yet when the daemon stops: the job is cancelled even so. */
+static void test_a_stop_before_the_context(void **state) {
+  queue *q = open_queue(*state, 1);
+  orb_context *ctx;
+  submit(*state, q, "endless", SMALL);
+  job *j = take(q, "endless");
+  assert_int_equal(orb_context_create(&(orb_context_options){.threads = 1}, &ctx), ORB_OK);
+  queue_stop(q, 1);
+  queue_set_context(q, j, ctx);
+  assert_int_equal(orb_context_check(ctx), ORB_E_CANCELLED);
+  queue_set_context(q, j, NULL);
+  queue_give_back(q, j);
+  queue_destroy(q);
+  orb_context_destroy(ctx);
+}
+
 /* A job whose process was killed, perhaps because memory was short, runs alone the next time. Small jobs of other
  * owners neither wait for that nor until it can begin. */
 static void test_guests_pass_a_suspect(void **state) {
@@ -180,18 +214,113 @@ static void test_guests_pass_a_suspect(void **state) {
   submit(s, q, "long", SMALL);
   job *killed = take(q, "killed"), *other = take(q, "long");
   assert_int_equal(queue_claim(q, killed), STORE_OK);
-  assert_int_equal(queue_crashed(q, killed, 0), 0);
+  assert_int_equal(queue_crashed(q, killed, QUEUE_SUSPECTED), 0);
   submit(s, q, "small", SMALL);
   job *first = take_in(q, QUEUE_GUESTS, "small");
   end_after(q, other, SECOND);
   killed = take(q, "killed");
-  assert_true(q->exclusive);
+  assert_ptr_equal(q->alone, killed);
   submit(s, q, "late", SMALL);
   end_after(q, take_in(q, QUEUE_GUESTS, "late"), 0);
   end_after(q, first, 0);
-  assert_true(q->exclusive);
+  assert_ptr_equal(q->alone, killed);
   end_after(q, killed, 0);
-  assert_false(q->exclusive);
+  assert_null(q->alone);
+  queue_destroy(q);
+}
+
+/* What a worker finds; it does not wait. */
+static job *look(queue *q) {
+  pthread_mutex_lock(&q->lock);
+  job *j = schedule_choose(q, QUEUE_COMPUTES);
+  pthread_mutex_unlock(&q->lock);
+  return j;
+}
+
+static void let_wait_pass(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  j->alone_until -= SUSPECT_MS;
+  pthread_mutex_unlock(&q->lock);
+}
+
+/* A queue whose jobs have processes of their own, with two workers, of which one has a job; another job is a suspect.
+ */
+static queue *open_with_suspect(stored *s, job **suspect, job **other) {
+  queue *q = open_queue(s, 2);
+  assert_int_equal(queue_recover(q, 1), STORE_OK);
+  submit(s, q, "killed", SMALL);
+  submit(s, q, "long", SMALL);
+  *suspect = take(q, "killed");
+  *other = take(q, "long");
+  assert_int_equal(queue_claim(q, *suspect), STORE_OK);
+  assert_int_equal(queue_crashed(q, *suspect, QUEUE_SUSPECTED), 0);
+  assert_null(look(q));
+  submit(s, q, "late", SMALL);
+  return q;
+}
+
+/* A suspect waits until the others have ended, and keeps those that come later waiting, but only for so long. Then it
+ * runs beside them, so its next death does not count for it alone. */
+static void test_a_suspect_waits_only_so_long(void **state) {
+  job *killed, *other;
+  queue *q = open_with_suspect(*state, &killed, &other);
+  assert_null(look(q));
+  let_wait_pass(q, killed);
+  assert_non_null(look(q));
+  pass(q, other, SECOND); /* so that "late" is not the next one */
+  assert_ptr_equal(take(q, "killed"), killed);
+  assert_null(q->alone);
+  assert_int_equal(queue_claim(q, killed), STORE_OK);
+  assert_false(queue_runs_alone(q, killed));
+  end_after(q, other, 0);
+  end_after(q, take(q, "late"), 0);
+  queue_give_back(q, killed);
+  queue_destroy(q);
+}
+
+/* Others wait for a suspect that runs alone, but only for so long. It was alone until another one began. */
+static void test_others_wait_only_so_long(void **state) {
+  job *killed, *other;
+  queue *q = open_with_suspect(*state, &killed, &other);
+  end_after(q, other, SECOND);
+  assert_ptr_equal(take(q, "killed"), killed);
+  assert_int_equal(queue_claim(q, killed), STORE_OK);
+  assert_null(look(q));
+  let_wait_pass(q, killed);
+  assert_true(queue_runs_alone(q, killed));
+  job *late = take(q, "late");
+  assert_false(queue_runs_alone(q, killed));
+  end_after(q, late, 0);
+  queue_give_back(q, killed);
+  queue_destroy(q);
+}
+
+/* A job whose process ended with all others is no suspect. Such an end counts only if the job repeats without end. */
+static void test_nobody_is_blamed(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 2);
+  assert_int_equal(queue_recover(q, 1), STORE_OK);
+  submit(s, q, "one", SMALL);
+  submit(s, q, "two", SMALL);
+  job *one = take(q, "one"), *two = take(q, "two");
+  for (int attempt = 1; attempt < ATTEMPTS_BORNE; attempt++) {
+    assert_int_equal(queue_claim(q, one), STORE_OK);
+    assert_int_equal(queue_crashed(q, one, attempt % 2 ? QUEUE_NOT_BLAMED : QUEUE_SUSPECTED), 0);
+    assert_int_equal(one->row.suspect, attempt % 2 == 0);
+    assert_int_equal(one->row.crashes, 0);
+    let_wait_pass(q, one);
+    assert_ptr_equal(take(q, "one"), one);
+  }
+  for (int crash = 1; crash <= CRASHES_MOST; crash++) {
+    assert_int_equal(queue_claim(q, one), STORE_OK);
+    assert_int_equal(queue_crashed(q, one, QUEUE_NOT_BLAMED), crash == CRASHES_MOST);
+    assert_int_equal(one->row.crashes, crash < CRASHES_MOST ? crash : CRASHES_MOST - 1);
+    if (crash < CRASHES_MOST) {
+      assert_ptr_equal(take(q, "one"), one);
+    }
+  }
+  queue_finish(q, one, API_JOB_FAILED, "{}");
+  end_after(q, two, 0);
   queue_destroy(q);
 }
 
@@ -209,6 +338,7 @@ static void test_a_suspect_is_no_guest(void **state) {
   submit(s, q, "suspect", SMALL);
   submit(s, q, "small", SMALL);
   q->first->row.suspect = 1;
+  q->first->alone_until = INT64_MAX;
   pthread_mutex_lock(&q->lock);
   assert_null(schedule_choose(q, QUEUE_GUESTS));
   pthread_mutex_unlock(&q->lock);
@@ -372,14 +502,6 @@ static void test_listeners(void **state) {
   budget_destroy(memory);
 }
 
-/* What a worker finds; it does not wait. */
-static job *look(queue *q) {
-  pthread_mutex_lock(&q->lock);
-  job *j = schedule_choose(q, QUEUE_COMPUTES);
-  pthread_mutex_unlock(&q->lock);
-  return j;
-}
-
 /* A job that needs all memory of jobs waits for a check. Later large checks leave it room, until it has its memory or
  * is cancelled; small ones do not wait. */
 static void test_a_job_claims_memory(void **state) {
@@ -414,15 +536,19 @@ static void test_a_job_claims_memory(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test_setup_teardown(test_time_decides, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_measure_replaces_estimate, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_running_jobs_count, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_share, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_pauses_earn_nothing, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_given_back, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_guests_pass_a_suspect, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_a_suspect_is_no_guest, stored_setup, stored_teardown),
-      cmocka_unit_test_setup_teardown(test_a_job_claims_memory, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_time_decides, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_measure_replaces_estimate, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_running_jobs_count, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_share, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_pauses_earn_nothing, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_given_back, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_stop_before_the_context, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_guests_pass_a_suspect, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_suspect_is_no_guest, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_suspect_waits_only_so_long, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_others_wait_only_so_long, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_nobody_is_blamed, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_a_job_claims_memory, setup, teardown),
       cmocka_unit_test(test_tasks_take_turns),
       cmocka_unit_test(test_tasks_share_memory),
       cmocka_unit_test(test_memory_of_files),

@@ -69,7 +69,9 @@ static void check(stored *s, const told *t, int64_t number) {
   }
   if (t->job == STORE_OK) {
     assert_int_equal(catalogue_job_get(s->cat, job.id, &got), STORE_OK);
-    assert_string_equal(got.request, job.request);
+    char *request = catalogue_job_request(s->cat, job.id);
+    assert_string_equal(request, got.state == API_JOB_SUCCEEDED ? "{}" : job.request);
+    free(request);
     assert_true(got.state == API_JOB_SUCCEEDED || (t->finish != STORE_OK && got.state < API_JOB_SUCCEEDED));
     job_row_free(&got);
   }
@@ -107,7 +109,6 @@ static void read_lists(stored *s, const told *t) {
   n = catalogue_job_list(s->cat, "me", NULL, -1, 0, 8, jobs);
   assert_true(n < 0 || t->job != STORE_OK || n > 0);
   for (int i = 0; i < n; i++) {
-    assert_string_equal(jobs[i].request, "{\"r\":1}");
     assert_int_equal(strlen(jobs[i].id), API_JOB_ID_SIZE - 1);
     job_row_free(&jobs[i]);
   }

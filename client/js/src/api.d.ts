@@ -737,7 +737,7 @@ export type Usage = {
   meshes: number;
   /** Of its meshes and landmarks. */
   bytes: number;
-  /** Of embeddings, supermeshes and kept alignments that its jobs made. */
+  /** Of embeddings, supermeshes and kept alignments that its jobs made, and of the requests of its unfinished jobs, with the landmarks that they name. */
   derived_bytes: number;
   /** The limits of the caller's token; for other tenants, the smallest of their tokens. 0: no limit. */
   quotas: {
@@ -1153,7 +1153,7 @@ export type ProblemNotGenusZero = {
   /** What is wrong and what to do. */
   detail: string;
   genus: number;
-  /** A loop for each handle, up to 32768 loops and 262144 vertices in all: vertices of the file, each once, joined by edges; the last is joined to the first. A cut along it leaves the surface in one piece. */
+  /** A loop for each handle, up to 32768 loops and 262144 vertices in all, in the problem of a job at most 32 KB of them: vertices of the file, each once, joined by edges; the last is joined to the first. A cut along it leaves the surface in one piece. */
   loops: number[][];
   /** The length of each loop, relative to the diagonal. */
   loop_lengths_relative: number[];
@@ -1271,7 +1271,7 @@ export type ProblemQuotaExceeded = {
   quota: number;
   /** The bytes of what the tenant's jobs made, if that quota is exhausted. */
   used?: number;
-  /** The bytes that the tenant's unfinished jobs will add, estimated; with `used`. */
+  /** The bytes of the requests of the tenant's unfinished jobs, and those that they will add, estimated; with `used`. */
   pending?: number;
 };
 

@@ -1,6 +1,7 @@
 // Starts a real daemon on a free port with its own data folder, and talks to it.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
+import { setMaxListeners } from 'node:events';
 import { readFileSync } from 'node:fs';
 import { mkdtemp, rm, readFile } from 'node:fs/promises';
 import { createServer } from 'node:http';
@@ -72,6 +73,7 @@ export class Daemon {
     this.exited = new Promise((resolve) => child.once('exit', (code, signal) => resolve({ code, signal })));
     // A busy undici misses the end of a connection once in many hundred deaths of a server, and then waits forever.
     const over = new AbortController();
+    setMaxListeners(0, over.signal); // each request in flight has one
     this.over = over;
     this.exited.then(() => {
       const timer = setTimeout(() => over.abort(new Error('the daemon has ended')), OVER_MS);

@@ -19,12 +19,9 @@ export function children(pid) {
 /** The processes that check meshes and run jobs. */
 export const workers = (d) => children(d.child.pid).flatMap(children);
 
-/** Megabytes of the daemon and all its processes; what they share counts once. what: all that is resident (''), or
- * parts of that: anonymous memory ('_Anon'), memory as files ('_Shmem'). The rest is pages of files. */
-export function megabytes(d, ...what) {
+function megabytesOf(pids, what) {
   let kilobytes = 0;
-  const forks = children(d.child.pid);
-  for (const pid of [d.child.pid, ...forks, ...forks.flatMap(children)]) {
+  for (const pid of pids) {
     try {
       const usage = readFileSync(`/proc/${pid}/smaps_rollup`, 'latin1');
       for (const each of what.length ? what : ['']) {
@@ -36,6 +33,16 @@ export function megabytes(d, ...what) {
   }
   return kilobytes / 1024;
 }
+
+/** Megabytes of the daemon and all its processes; what they share counts once. what: all that is resident (''), or
+ * parts of that: anonymous memory ('_Anon'), memory as files ('_Shmem'). The rest is pages of files. */
+export function megabytes(d, ...what) {
+  const forks = children(d.child.pid);
+  return megabytesOf([d.child.pid, ...forks, ...forks.flatMap(children)], what);
+}
+
+/** The same of the daemon's own process. */
+export const ownMegabytes = (d, ...what) => megabytesOf([d.child.pid], what);
 
 /** Seconds of processor time of the daemon's own process. */
 export function ownSeconds(d) {
@@ -61,4 +68,14 @@ export function workSeconds(d) {
     add(fork, 13); // those that have ended
   }
   return ticks / 100;
+}
+
+/** How many times slower a thread is now than alone, because of other work on this machine. */
+export function busy() {
+  const [began, before] = [performance.now(), process.cpuUsage()];
+  let used;
+  do {
+    used = process.cpuUsage(before);
+  } while (used.user + used.system < 50_000);
+  return Math.max(1, (1000 * (performance.now() - began)) / (used.user + used.system));
 }
