@@ -62,11 +62,12 @@ static int execute(sql_connection *c, const char *sql) {
   return code_of(code);
 }
 
-/* The pages that savepoints keep, those of a few jobs, stay in memory: by default SQLite writes more than 64 KiB to a
- * file in /var/tmp, which takes longer than the write of a small job itself. */
+/* The pages that savepoints keep, those of a few jobs, stay in memory, however many. By default SQLite writes more than
+ * 64 KiB to a file in /var/tmp. That takes longer than the write of a small job itself, and version 3.40 sometimes fails
+ * there with SQLITE_FULL: it writes an empty last piece and takes the 0 bytes for a full disk. */
 static void keep_savepoints_in_memory(void) {
-  enum { SPILL_BYTES = 4 << 20 };
-  sqlite3_config(SQLITE_CONFIG_STMTJRNL_SPILL, SPILL_BYTES);
+  enum { NEVER = -1 };
+  sqlite3_config(SQLITE_CONFIG_STMTJRNL_SPILL, NEVER);
 }
 
 static int open_file(const char *where, int writer, sql_connection *out) {
