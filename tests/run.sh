@@ -75,7 +75,7 @@ step_asan() {
   build_release
   cmake --preset asan -DORB_TESTS=ON -DORB_PLAIN="$PWD/build" >/dev/null
   "${behind[@]}" cmake --build build-asan
-  run_tests build-asan -R '^(unit|scenario)\.' -E "^scenario\.($release_only)\$"
+  ASAN_OPTIONS=${ASAN_OPTIONS:+$ASAN_OPTIONS:}handle_sigill=1 run_tests build-asan -R '^(unit|scenario)\.' -E "^scenario\.($release_only)\$"
 }
 
 # From one seed, so that two runs try much the same inputs; long runs look for new ones.
