@@ -97,9 +97,13 @@ static int convert_isolated(catalogue *cat, objects *store, orb_context *ctx, co
   }
   process.wanted = limits->wanted;
   process.user = limits->user;
-  int result = isolate_send(&process, FRAME_TASK, &part, 1, asset) == CHANNEL_OK
-                   ? take(&process, store, ctx, out, &breach, problem)
-                   : -1;
+  int result = -1;
+  const channel_result sent = isolate_send(&process, FRAME_TASK, &part, 1, asset);
+  if (sent == CHANNEL_OK) {
+    result = take(&process, store, ctx, out, &breach, problem);
+  } else {
+    breach = isolate_breach(&process, sent);
+  }
   const int alone = isolate_is_alone(&process);
   int status = isolate_close(&process);
   if (result >= 0) {

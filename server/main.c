@@ -114,8 +114,8 @@ static void on_change(const char *name, int taken) {
 /* Executes a command from the control socket. */
 static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
-  char what[8] = "", verb[8] = "", name[64] = "", tenant[64] = "";
-  sscanf(line, "%7s %7s %63s %*s %*s %*s %63s", what, verb, name, tenant);
+  char what[8] = "", verb[8] = "", subject[ADMIN_WORD];
+  sscanf(line, "%7s %7s", what, verb);
   const admin_kind *kind = admin_kind_named(admin_kinds, what);
   const int lists = strcmp(verb, "list") == 0, shows = strcmp(verb, "secret") == 0;
   if (!kind) {
@@ -130,8 +130,8 @@ static int on_command(void *user, const char *line, api_text *reply) {
     status = !parts_reload_callers(srv);
   }
   if (!lists) {
-    const char *whose = strcmp(name, "-") == 0 ? tenant : name; /* the secret of webhooks is a tenant's */
-    log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s%s", kind->name, verb, whose, status ? ", failed" : "");
+    admin_subject(kind, line, subject);
+    log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s%s", kind->name, verb, subject, status ? ", failed" : "");
   }
   return status;
 }

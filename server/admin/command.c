@@ -131,6 +131,27 @@ static void write_line(const admin_command *command, char line[ADMIN_LINE], char
   sodium_memzero(secret, sizeof secret);
 }
 
+enum { LINE_NAME = 2, LINE_FLAGS }; /* words of a line, from 0 on */
+
+static void word_of(const char *line, int n, char out[ADMIN_WORD]) {
+  line += strspn(line, " ");
+  for (int i = 0; i < n; i++) {
+    line += strcspn(line, " ");
+    line += strspn(line, " ");
+  }
+  snprintf(out, ADMIN_WORD, "%.*s", (int)strcspn(line, " "), line);
+}
+
+void admin_subject(const admin_kind *kind, const char *line, char out[ADMIN_WORD]) {
+  word_of(line, LINE_NAME, out);
+  for (int i = 0; strcmp(out, "-") == 0 && kind->holder && i < ADMIN_FLAGS && kind->flags[i].name; i++) {
+    if (strcmp(kind->flags[i].name, kind->holder) == 0) {
+      word_of(line, LINE_FLAGS + i, out);
+      return;
+    }
+  }
+}
+
 static int show(const admin_command *command, int status, const api_text *reply, const char *shown) {
   if (status != 0) {
     fprintf(stderr, "orbmorphd: %s", reply->data ? reply->data : "the command failed; the log says why\n");

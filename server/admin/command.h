@@ -39,6 +39,7 @@ typedef struct admin_kind {
   const char *usage;  /* lines of the commands */
   const char *values; /* the values that the flags take */
   int takes_ids;      /* NAME may be an id, which has 64 letters */
+  const char *holder; /* the flag that names what verbs without NAME are about; NULL: none */
   admin_verb verbs[ADMIN_VERBS];
   admin_flag flags[ADMIN_FLAGS];
   /* Makes a secret: what is shown, and the word that stands for it in the line. NULL: the kind has none. */
@@ -64,6 +65,9 @@ int admin_command_read(admin_command *out, const admin_kind *kind, int *argc, ch
 int admin_command_ask(const admin_command *command, const config *options);
 /* Executes the command in this process, which holds the lock of the data folder. Returns the exit status. */
 int admin_command_run(const admin_command *command, const config *options);
+
+/* What a line is about, for the log: its NAME, or the word of the kind's `holder`; "-" if it has neither. */
+void admin_subject(const admin_kind *kind, const char *line, char out[ADMIN_WORD]);
 
 /* For admin_flag.read. A name has 1 to 63 letters, digits, '-', '_' and '.', and does not begin with '-'. */
 int admin_read_name(const char *value, char word[ADMIN_WORD]);

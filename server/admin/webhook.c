@@ -129,6 +129,7 @@ const admin_kind admin_webhook = {
         "--url takes an https:// or http:// URL of at most 511 bytes, --events a list of succeeded, failed and "
         "cancelled, "
         "--tenant a name, --overlap a time such as 7d or 12h",
+    .holder = "--tenant", /* whose secret it is */
     .verbs = {{"add", 1, 1}, {"rotate", 1, 1}, {"remove", 1, 0}, {"list", 0, 0}, {"secret", 0, 0}},
     .flags = {{"--url", ADD, ADD, "-", read_url},
               {"--events", ADD, 0, "succeeded,failed,cancelled", read_event_list},

@@ -5,6 +5,7 @@
 #include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,9 @@
 #include "orbmorph/context.h"
 #include "wake.h"
 
+/* CUT_OFF_MS: a body whose client has left is given up this long after its last byte; longer than the write of what
+ * libmicrohttpd still holds of it takes. */
+enum { CUT_OFF_MS = 1000 };
 enum { TICK_MS = 250, LINGER_TICK_MS = 20, LINGERERS = 256, LINGER_MS = 5000, LINGER_IDLE_MS = 1500 };
 static const int64_t LINGER_BYTES = INT64_C(64) << 20;
 
@@ -28,7 +32,8 @@ struct watched {
   int over;            /* the address had too many connections when this one opened */
   int phase;           /* phase, since and received: __atomic, written by the thread that serves the connection */
   int64_t since, received;
-  int64_t seen_received, seen_acked, looked; /* of the watching thread only */
+  int64_t seen_received, seen_acked, looked; /* of the watching thread only, as are the next two */
+  int64_t left_at, left_received;            /* the first look after the client left, and the bytes then; 0: none */
 };
 
 typedef struct lingerer {
@@ -72,6 +77,24 @@ static void doom(watched *c) {
   c->doomed = 1;
 }
 
+/* Has the client left in the middle of a body? libmicrohttpd misses that where it reads the last bytes after the client
+ * has left: its edge-triggered epoll does not tell twice. */
+static int is_cut_off(watched *c, int64_t now) {
+  struct pollfd look = {.fd = c->fd, .events = POLLRDHUP};
+  const int64_t received = __atomic_load_n(&c->received, __ATOMIC_RELAXED);
+  int unread = 0;
+  if (poll(&look, 1, 0) <= 0 || !(look.revents & (POLLRDHUP | POLLHUP)) || ioctl(c->fd, FIONREAD, &unread) != 0 ||
+      unread > 0) {
+    c->left_at = 0;
+    return 0;
+  }
+  if (c->left_at == 0 || c->left_received != received) {
+    c->left_at = now;
+    c->left_received = received;
+  }
+  return now - c->left_at >= CUT_OFF_MS;
+}
+
 static void inspect(watch *w, watched *c, int64_t now) {
   const config *o = w->options;
   int at = __atomic_load_n(&c->phase, __ATOMIC_ACQUIRE);
@@ -81,6 +104,10 @@ static void inspect(watch *w, watched *c, int64_t now) {
     if (now - since > 1000 * (o->header_seconds + (at == PHASE_NEXT_HEADERS ? o->idle_seconds : 0))) {
       doom(c);
     }
+    return;
+  }
+  if (at == PHASE_RECEIVING && is_cut_off(c, now)) {
+    doom(c);
     return;
   }
   if (at == PHASE_WORKING || least == 0) {

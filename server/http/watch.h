@@ -3,7 +3,7 @@
  * libmicrohttpd closes connections that are silent for idle-seconds, but keeps one that sends a byte now and then. A
  * thread here closes connections whose headers are incomplete after header-seconds, and those that transfer a body or
  * a response more slowly than min-rate, measured over slow-seconds. A suspended request and an event stream with
- * nothing to send do not count as slow.
+ * nothing to send do not count as slow. It also closes connections whose client has left in the middle of a body.
  *
  * An address (for IPv6 its /64) has a limit on connections and a bucket of requests, see addresses.h.
  *

@@ -63,8 +63,8 @@ static int execute(sql_connection *c, const char *sql) {
 }
 
 /* The pages that savepoints keep, those of a few jobs, stay in memory, however many. By default SQLite writes more than
- * 64 KiB to a file in /var/tmp. That takes longer than the write of a small job itself, and version 3.40 sometimes fails
- * there with SQLITE_FULL: it writes an empty last piece and takes the 0 bytes for a full disk. */
+ * 64 KiB to a file in /var/tmp. That takes longer than the write of a small job itself, and version 3.40 sometimes
+ * fails there with SQLITE_FULL: it writes an empty last piece and takes the 0 bytes for a full disk. */
 static void keep_savepoints_in_memory(void) {
   enum { NEVER = -1 };
   sqlite3_config(SQLITE_CONFIG_STMTJRNL_SPILL, NEVER);

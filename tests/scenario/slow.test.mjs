@@ -65,6 +65,19 @@ test('slow headers and bodies', async (t) => {
   assert.equal((await d.get('/livez')).status, 200);
 });
 
+test('clients that leave in the middle of a body give back what they hold', async (t) => {
+  const d = await daemon(t, { args: ['--idle-seconds', '3600', '--min-rate', '0', '--limits', 'off'] });
+  const open = async () => Number(/^orbmorph_connections (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
+  const head = 'POST /v1/meshes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10000000\r\n\r\n';
+  const half = Buffer.alloc(3 << 20, '# words\n');
+  const gone = Array.from({ length: 100 }, () => connect(d, t));
+  await Promise.all(
+    gone.map(({ socket }) => new Promise((sent) => socket.write(Buffer.concat([Buffer.from(head), half]), sent))),
+  );
+  for (const { socket } of gone) socket.destroy();
+  await until(async () => (await open()) < 5, 'they are closed', 60);
+});
+
 test('responses that nobody reads, and clients that wait', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const size = 60_000_000;

@@ -188,6 +188,8 @@ test('a token is valid until it expires, and the audit log names who was refused
   const webhook = (...words) => promisify(execFile)(binaries.daemon, ['webhook', ...words, '--data', d.data]);
   const { stdout: shown } = await webhook('secret', '--tenant', 'shop');
   await webhook('list');
+  const crash = 'ab'.repeat(32); // an id, longer than a name
+  await assert.rejects(promisify(execFile)(binaries.daemon, ['crash', 'clear', crash, '--data', d.data]));
   const { id } = (await d.post('/v1/meshes', Buffer.from(shapes.tetrahedron), bearer(root))).json;
   assert.equal((await d.delete(`/v1/meshes/${id}`, bearer(day))).status, 403);
   assert.equal((await d.request('PUT', '/v1/no"where', { headers: {} })).status, 401);
@@ -210,6 +212,7 @@ test('a token is valid until it expires, and the audit log names who was refused
   has({ audit: 'command', message: 'token set: soon' });
   has({ audit: 'command', message: 'token set: nobody, failed' });
   has({ audit: 'command', message: 'webhook secret: shop' });
+  has({ audit: 'command', message: `crash clear: ${crash}, failed` });
   assert.ok(!lines.some(({ message }) => /list/.test(message)) && !d.log.includes(shown.trim()));
   has({
     audit: 'refused',
