@@ -12,14 +12,23 @@
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
 #include "base/memory.h"
+#include "base/tasks.h"
+
+/* One way: where an unfolding starts, where it ends, and the flips that remain. */
+typedef struct way {
+  double *from, *to;
+  int32_t flips;
+} way;
+
+enum { UNTANGLED, RESTORED, WAYS };
 
 typedef struct clearing {
   orb_map_run *c;
   orb_map_level *l;
   size_t size;       /* of the points of all vertices, 3 each */
   double *before;    /* points before a round's untangling, */
-  double *from;      /* before an unfolding, */
-  double *best_from; /* before the best one, */
+  way ways[WAYS];    /* of a round, */
+  double *best_from; /* before the best unfolding, */
   double *best_to;   /* and after it */
   double energy;     /* then; INFINITY: none has cleared all flips */
 } clearing;
@@ -27,32 +36,43 @@ typedef struct clearing {
 static orb_status clearing_create(clearing *w) {
   const size_t n = 3 * (size_t)w->l->count;
   w->size = n * sizeof *w->before;
-  w->before = ORB_NEW(w->c->ctx, double, 4 * n);
+  w->before = ORB_NEW(w->c->ctx, double, (3 + 2 * WAYS) * n);
   if (!w->before) {
     return ORB_E_NO_MEMORY;
   }
-  w->from = w->before + n;
-  w->best_from = w->from + n;
+  w->best_from = w->before + n;
   w->best_to = w->best_from + n;
+  for (int i = 0; i < WAYS; i++) {
+    w->ways[i].from = w->best_to + (size_t)(2 * i + 1) * n;
+    w->ways[i].to = w->ways[i].from + n;
+  }
   return ORB_OK;
 }
 
-/* Unfolds the level from where it is, and notes the way if it is the best one. Not if flips remain or the level then
+/* Unfolds a copy of the level, which shares all but its points. */
+static orb_status unfold_one(orb_context *ctx, void *arg, int32_t i) {
+  const clearing *w = arg;
+  way *one = &((clearing *)arg)->ways[i];
+  orb_map_level level = *w->l;
+  level.x = one->to;
+  memcpy(one->to, one->from, w->size);
+  return orb_map_level_unfold(ctx, &level, &one->flips);
+}
+
+/* Takes the level to the end of a way, and notes the way if it is the best one. Not if flips remain or the level then
  * covers the sphere another number of times. */
-static orb_status try_unfolding(clearing *w, int degree) {
+static orb_status judge(clearing *w, const way *one, int degree) {
   orb_map_level *l = w->l;
-  int32_t flips;
-  memcpy(w->from, l->x, w->size);
-  ORB_TRY(orb_map_level_unfold(w->c->ctx, l, &flips));
-  if (flips || (degree == 1 && orb_map_level_degree(l) != 1)) {
+  memcpy(l->x, one->to, w->size);
+  if (one->flips || (degree == 1 && orb_map_level_degree(l) != 1)) {
     return ORB_OK;
   }
   ORB_TRY(orb_map_level_locate_all(w->c->ctx, l, &w->c->b, 0));
   const double energy = orb_map_level_energy(l);
   if (energy < w->energy) {
     w->energy = energy;
-    memcpy(w->best_from, w->from, w->size);
-    memcpy(w->best_to, l->x, w->size);
+    memcpy(w->best_from, one->from, w->size);
+    memcpy(w->best_to, one->to, w->size);
   }
   return ORB_OK;
 }
@@ -60,10 +80,15 @@ static orb_status try_unfolding(clearing *w, int degree) {
 /* Unfolds a level that untangling has left with flips: from there, and from where folds are taken back, since
  * untangling makes some folds easier to unfold and only spreads others. *flips: those after folds are taken back. */
 static orb_status unfold(clearing *w, int degree, int32_t *flips) {
-  ORB_TRY(try_unfolding(w, degree));
-  memcpy(w->l->x, w->from, w->size);
+  memcpy(w->ways[UNTANGLED].from, w->l->x, w->size);
   ORB_TRY(orb_map_level_restore_folds(w->c->ctx, w->l, w->before, flips));
-  return try_unfolding(w, degree);
+  memcpy(w->ways[RESTORED].from, w->l->x, w->size);
+  const int count = memcmp(w->ways[UNTANGLED].from, w->ways[RESTORED].from, w->size) == 0 ? 1 : WAYS;
+  ORB_TRY(orb_tasks_run(w->c->ctx, count, unfold_one, w));
+  for (int i = 0; i < count; i++) {
+    ORB_TRY(judge(w, &w->ways[i], degree));
+  }
+  return ORB_OK;
 }
 
 /* Untangles the level, and unfolds what is left. *flips: those that untangling leaves; if there are any, the level is

@@ -289,38 +289,55 @@ static int is_inside(const double (*ring)[3], int32_t count, const double p[3]) 
   return 1;
 }
 
-/* How well a star holds the point p: its least determinant over squared edge. Not positive: p flips a triangle. */
-static double seat_of(const unfolding *u, const int32_t *star, int count, const double p[3]) {
-  double least = INFINITY;
+/* The ring of a vertex that may move, in its order. */
+typedef struct hoop {
+  int count;
+  double at[RING_MOST + 1][3]; /* the last one is the first one again */
+  double length2[RING_MOST];   /* of its edges, squared */
+} hoop;
+
+static void hoop_of(const unfolding *u, const int32_t *star, int count, hoop *out) {
+  out->count = count;
   for (int i = 0; i < count; i++) {
-    const double *a = at(u, end_of(u, star[i])), *b = at(u, end_of(u, star[(i + 1) % count]));
-    least = fmin(least, orb_det(p, a, b) / orb_distance2(a, b));
+    memcpy(out->at[i], at(u, end_of(u, star[i])), sizeof out->at[i]);
+  }
+  memcpy(out->at[count], out->at[0], sizeof out->at[0]);
+  for (int i = 0; i < count; i++) {
+    out->length2[i] = orb_distance2(out->at[i], out->at[i + 1]);
+  }
+}
+
+/* How well a ring holds the point p: its least determinant over squared edge. Not positive: p flips a triangle. */
+static double seat_of(const hoop *ring, const double p[3]) {
+  double least = INFINITY;
+  for (int i = 0; i < ring->count; i++) {
+    least = fmin(least, orb_det(p, ring->at[i], ring->at[i + 1]) / ring->length2[i]);
   }
   return least;
 }
 
-/* Whether p flips no triangle of the star, decided exactly. */
-static int flips_nothing(const unfolding *u, const int32_t *star, int count, const double p[3]) {
-  for (int i = 0; i < count; i++) {
-    if (orb_orient(p, at(u, end_of(u, star[i])), at(u, end_of(u, star[(i + 1) % count]))) <= 0) {
+/* Whether p flips no triangle of the ring, decided exactly. */
+static int flips_nothing(const hoop *ring, const double p[3]) {
+  for (int i = 0; i < ring->count; i++) {
+    if (orb_orient(p, ring->at[i], ring->at[i + 1]) <= 0) {
       return 0;
     }
   }
   return 1;
 }
 
-/* Moves v towards a point as far as its star holds it: with at least `enough`, or better than now. */
-static int approach(unfolding *u, int32_t v, const int32_t *star, int count, const double to[3], double enough) {
-  double *x = u->l->x + 3 * (size_t)v, share = 1;
-  const double now = seat_of(u, star, count, x);
+/* Moves x, which its ring holds so well `now`, towards a point as far as the ring holds it with at least `enough`, or
+ * better than now. */
+static int approach(double x[3], const hoop *ring, double now, const double to[3], double enough) {
+  double share = 1;
   for (int i = 0; i < HALVINGS; i++, share /= 2) {
     double p[3];
     for (int k = 0; k < 3; k++) {
       p[k] = x[k] + share * (to[k] - x[k]);
     }
     orb_normalize(p);
-    const double there = seat_of(u, star, count, p);
-    if ((there >= enough || there > GAIN * now) && flips_nothing(u, star, count, p)) {
+    const double there = seat_of(ring, p);
+    if ((there >= enough || there > GAIN * now) && flips_nothing(ring, p)) {
       memcpy(x, p, sizeof p);
       return 1;
     }
@@ -331,16 +348,21 @@ static int approach(unfolding *u, int32_t v, const int32_t *star, int count, con
 /* Moves v home as far as its star holds it well, or else, if it is cramped, towards the middle of its ring. */
 static void relax(unfolding *u, int32_t v) {
   int32_t star[RING_MOST];
-  double middle[3] = {0};
+  hoop ring;
+  double *x = u->l->x + 3 * (size_t)v, middle[3] = {0};
   const int count = u->l->pinned[v] ? 0 : star_of(u, v, star);
-  if (count < 3 || (u->home && approach(u, v, star, count, u->home + 3 * (size_t)v, SEATED)) ||
-      seat_of(u, star, count, at(u, v)) >= SEATED) {
+  if (count < 3) {
+    return;
+  }
+  hoop_of(u, star, count, &ring);
+  const double now = seat_of(&ring, x);
+  if ((u->home && approach(x, &ring, now, u->home + 3 * (size_t)v, SEATED)) || now >= SEATED) {
     return;
   }
   for (int i = 0; i < 3 * count; i++) {
-    middle[i % 3] += at(u, end_of(u, star[i / 3]))[i % 3] / count;
+    middle[i % 3] += ring.at[i / 3][i % 3] / count;
   }
-  (void)approach(u, v, star, count, middle, INFINITY);
+  (void)approach(x, &ring, now, middle, INFINITY);
 }
 
 /* Relaxes a vertex that is back, and its ring. */
