@@ -18,7 +18,7 @@
 
 /* CUT_OFF_MS: a body whose client has left is given up this long after its last byte; longer than the write of what
  * libmicrohttpd still holds of it takes. */
-enum { CUT_OFF_MS = 1000 };
+enum { CUT_OFF_MS = 1000, CUT_OFF_TICKS = 4 }; /* a look each second: ten thousand stalled uploads cost little */
 enum { TICK_MS = 250, LINGER_TICK_MS = 20, LINGERERS = 256, LINGER_MS = 5000, LINGER_IDLE_MS = 1500 };
 static const int64_t LINGER_BYTES = INT64_C(64) << 20;
 
@@ -48,6 +48,7 @@ struct watch {
   pthread_cond_t wake;
   pthread_t thread;
   int stopping;
+  unsigned ticks;
   watched *first;
   addresses *from;
   lingerer lingerers[LINGERERS];
@@ -106,7 +107,7 @@ static void inspect(watch *w, watched *c, int64_t now) {
     }
     return;
   }
-  if (at == PHASE_RECEIVING && is_cut_off(c, now)) {
+  if (at == PHASE_RECEIVING && w->ticks % CUT_OFF_TICKS == 0 && is_cut_off(c, now)) {
     doom(c);
     return;
   }
@@ -171,6 +172,7 @@ static void *watch_main(void *argument) {
     serve_lingerers(w, now);
     if (now - inspected >= TICK_MS) {
       inspected = now;
+      w->ticks++;
       for (watched *c = w->first; c; c = c->next) {
         if (!c->doomed) {
           inspect(w, c, now);
