@@ -13,6 +13,7 @@
 #include "base/memory.h"
 #include "support_context.h"
 #include "support_shapes.h"
+#include "support_trials.h"
 
 enum { LIMBS = 5, WAYS = 120 };
 
@@ -121,11 +122,6 @@ static void a_knee_is_left_over(void **state) {
 /* A map with less is right: with two limbs swapped it is off by 0.9, and upside down by 2. */
 static const double RIGHT = 0.6;
 
-typedef struct scene {
-  orb_mesh mesh[2];
-  orb_trials coarse, small;
-} scene;
-
 /* Two creatures with a trunk. Two arms and a head are at one end of it, two legs at the other one. One has long arms
  * and short legs, the other one the reverse. */
 static void scene_open(scene *s) {
@@ -139,16 +135,7 @@ static void scene_open(scene *s) {
       s->mesh[k].positions[3 * (size_t)v + 2] *= trunk;
     }
   }
-  assert_int_equal(orb_trials_open(ctx, &s->mesh[0], &s->mesh[1], &s->coarse), ORB_OK);
-  assert_int_equal(orb_trials_open_small(&s->coarse, &s->small), ORB_OK);
-  assert_int_equal(orb_trials_survey(&s->small, 1), ORB_OK);
-}
-
-static void scene_close(scene *s) {
-  orb_trials_close(&s->small);
-  orb_trials_close(&s->coarse);
-  shape_free(ctx, &s->mesh[0]);
-  shape_free(ctx, &s->mesh[1]);
+  assert_int_equal(scene_survey(s, ctx), ORB_OK);
 }
 
 /* The mean distance of where a map takes the vertices of the small copy of shape k from their true places, in radii of

@@ -16,6 +16,7 @@
 #include "support_align.h"
 #include "support_context.h"
 #include "support_shapes.h"
+#include "support_trials.h"
 
 enum { LIMBS = 5, TWIN = 1, MIDDLE = 4 };
 
@@ -27,15 +28,9 @@ static const double reach[LIMBS] = {3.5, 3.5, 2.5, 2.5, 3};
 static const double odd_limb[LIMBS][3] = {
     {1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6}, {-0.48, -0.6, -0.64}, {0, 0.28, 0.96}};
 static const double odd_reach[LIMBS] = {6, 5, 4, 3, 3.5};
-typedef struct scene {
-  orb_mesh mesh[2];
-  orb_trials coarse, small;
-} scene;
 
 static orb_status prepare(scene *s, orb_context *of) {
-  ORB_TRY(orb_trials_open(of, &s->mesh[0], &s->mesh[1], &s->coarse));
-  ORB_TRY(orb_trials_open_small(&s->coarse, &s->small));
-  ORB_TRY(orb_trials_survey(&s->small, 1));
+  ORB_TRY(scene_survey(s, of));
   ORB_TRY(orb_trials_make(&s->small));
   return orb_trials_find_symmetries(&s->small);
 }
@@ -46,13 +41,6 @@ static void scene_open(scene *s) {
   s->mesh[0] = shape_creature(ctx, LIMBS, limb, reach, 4);
   s->mesh[1] = shape_creature(ctx, LIMBS, limb, reach, 3);
   assert_int_equal(prepare(s, ctx), ORB_OK);
-}
-
-static void scene_close(scene *s) {
-  orb_trials_close(&s->small);
-  orb_trials_close(&s->coarse);
-  shape_free(ctx, &s->mesh[0]);
-  shape_free(ctx, &s->mesh[1]);
 }
 
 static double distance(const double *p, const double *q) {
@@ -201,11 +189,6 @@ static void stretched_open(scene *s) {
   s->mesh[1] = shape_creature(ctx, LIMBS, limb, stretched, 3);
 }
 
-static void trials_close(scene *s) {
-  orb_trials_close(&s->small);
-  orb_trials_close(&s->coarse);
-}
-
 /* One thread and three find the same trials. */
 static void threads_change_nothing(void **state) {
   (void)state;
@@ -230,7 +213,7 @@ static void threads_change_nothing(void **state) {
     assert_memory_equal(x->pose[0].position, y->pose[0].position,
                         3 * (size_t)one.coarse.copy[0].mesh.vertex_count * sizeof(double));
   }
-  trials_close(&other);
+  scene_close_trials(&other);
   orb_context_destroy(three);
   scene_close(&one);
 }
@@ -257,7 +240,7 @@ static int64_t search_rationed(scene *s, int64_t at, orb_status *status) {
   orb_context *of;
   assert_int_equal(orb_context_create(&options, &of), ORB_OK);
   *status = search(s, of);
-  trials_close(s);
+  scene_close_trials(s);
   memset(&s->coarse, 0, sizeof s->coarse);
   memset(&s->small, 0, sizeof s->small);
   orb_context_destroy(of); /* it checks that nothing is left */

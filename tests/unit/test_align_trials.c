@@ -15,6 +15,7 @@
 #include "align/rotate/procrustes.h"
 #include "support_context.h"
 #include "support_shapes.h"
+#include "support_trials.h"
 
 enum { LIMBS = 5 };
 
@@ -24,26 +25,12 @@ static const double limb[LIMBS][3] = {{1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6},
 static const double alike[2][LIMBS] = {{4, 3.4, 2.9, 2.5, 2.2}, {3.2, 3.6, 2.3, 3, 2.6}};
 static const double unlike[2][LIMBS] = {{6, 5, 4, 3, 3.5}, {1.6, 1.8, 1.4, 1.3, 1.5}};
 
-typedef struct scene {
-  orb_mesh mesh[2];
-  orb_trials coarse, small;
-} scene;
-
 static void scene_open(scene *s, const double reach[2][LIMBS]) {
   memset(s, 0, sizeof *s);
   for (int k = 0; k < 2; k++) {
     s->mesh[k] = shape_creature(ctx, LIMBS, limb, reach[k], 4);
   }
-  assert_int_equal(orb_trials_open(ctx, &s->mesh[0], &s->mesh[1], &s->coarse), ORB_OK);
-  assert_int_equal(orb_trials_open_small(&s->coarse, &s->small), ORB_OK);
-  assert_int_equal(orb_trials_survey(&s->small, 1), ORB_OK);
-}
-
-static void scene_close(scene *s) {
-  orb_trials_close(&s->small);
-  orb_trials_close(&s->coarse);
-  shape_free(ctx, &s->mesh[0]);
-  shape_free(ctx, &s->mesh[1]);
+  assert_int_equal(scene_survey(s, ctx), ORB_OK);
 }
 
 /* The limb at whose end a point of a copy lies. */

@@ -77,12 +77,7 @@ orb_status orb_tips_find(orb_context *ctx, const orb_coarse_copy *copy, const or
       }
     }
   }
-  int32_t middle = 0;
-  for (int32_t v = 1; v < n && status == ORB_OK; v++) {
-    middle = mean[v] < mean[middle] ? v : middle;
-  }
   for (int32_t i = 0; i < out->count; i++) {
-    out->middle[i] = orb_survey_apart(survey, &copy->mesh, out->vertex[i], middle);
     memcpy(out->point[i], copy->points + 3 * (size_t)out->vertex[i], sizeof out->point[i]);
     for (int32_t k = 0; k < out->count; k++) {
       out->apart[i][k] = orb_survey_apart(survey, &copy->mesh, out->vertex[i], out->vertex[k]);

@@ -19,7 +19,6 @@ typedef struct orb_tips {
   double point[ORB_TIPS_MAX][3];                /* on the sphere */
   double apart[ORB_TIPS_MAX][ORB_TIPS_MAX];     /* distances along the surface */
   double log_apart[ORB_TIPS_MAX][ORB_TIPS_MAX]; /* their logarithms */
-  double middle[ORB_TIPS_MAX];                  /* distances from the vertex that is nearest to all others */
 } orb_tips;
 
 /* Some tips of one shape and theirs on another, and the rotation that takes them there best. */

@@ -51,8 +51,8 @@ static orb_status clearing_create(clearing *w) {
 
 /* Unfolds a copy of the level, which shares all but its points. */
 static orb_status unfold_one(orb_context *ctx, void *arg, int32_t i) {
-  const clearing *w = arg;
-  way *one = &((clearing *)arg)->ways[i];
+  clearing *w = arg; /* of which each task writes its own way */
+  way *one = &w->ways[i];
   orb_map_level level = *w->l;
   level.x = one->to;
   memcpy(one->to, one->from, w->size);

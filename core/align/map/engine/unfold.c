@@ -290,13 +290,13 @@ static int is_inside(const double (*ring)[3], int32_t count, const double p[3]) 
 }
 
 /* The ring of a vertex that may move, in its order. */
-typedef struct hoop {
+typedef struct one_ring {
   int count;
   double at[RING_MOST + 1][3]; /* the last one is the first one again */
   double length2[RING_MOST];   /* of its edges, squared */
-} hoop;
+} one_ring;
 
-static void hoop_of(const unfolding *u, const int32_t *star, int count, hoop *out) {
+static void gather_ring(const unfolding *u, const int32_t *star, int count, one_ring *out) {
   out->count = count;
   for (int i = 0; i < count; i++) {
     memcpy(out->at[i], at(u, end_of(u, star[i])), sizeof out->at[i]);
@@ -308,7 +308,7 @@ static void hoop_of(const unfolding *u, const int32_t *star, int count, hoop *ou
 }
 
 /* How well a ring holds the point p: its least determinant over squared edge. Not positive: p flips a triangle. */
-static double seat_of(const hoop *ring, const double p[3]) {
+static double seat_of(const one_ring *ring, const double p[3]) {
   double least = INFINITY;
   for (int i = 0; i < ring->count; i++) {
     least = fmin(least, orb_det(p, ring->at[i], ring->at[i + 1]) / ring->length2[i]);
@@ -317,7 +317,7 @@ static double seat_of(const hoop *ring, const double p[3]) {
 }
 
 /* Whether p flips no triangle of the ring, decided exactly. */
-static int flips_nothing(const hoop *ring, const double p[3]) {
+static int flips_nothing(const one_ring *ring, const double p[3]) {
   for (int i = 0; i < ring->count; i++) {
     if (orb_orient(p, ring->at[i], ring->at[i + 1]) <= 0) {
       return 0;
@@ -328,7 +328,7 @@ static int flips_nothing(const hoop *ring, const double p[3]) {
 
 /* Moves x, which its ring holds so well `now`, towards a point as far as the ring holds it with at least `enough`, or
  * better than now. */
-static int approach(double x[3], const hoop *ring, double now, const double to[3], double enough) {
+static int approach(double x[3], const one_ring *ring, double now, const double to[3], double enough) {
   double share = 1;
   for (int i = 0; i < HALVINGS; i++, share /= 2) {
     double p[3];
@@ -348,13 +348,13 @@ static int approach(double x[3], const hoop *ring, double now, const double to[3
 /* Moves v home as far as its star holds it well, or else, if it is cramped, towards the middle of its ring. */
 static void relax(unfolding *u, int32_t v) {
   int32_t star[RING_MOST];
-  hoop ring;
+  one_ring ring;
   double *x = u->l->x + 3 * (size_t)v, middle[3] = {0};
   const int count = u->l->pinned[v] ? 0 : star_of(u, v, star);
   if (count < 3) {
     return;
   }
-  hoop_of(u, star, count, &ring);
+  gather_ring(u, star, count, &ring);
   const double now = seat_of(&ring, x);
   if ((u->home && approach(x, &ring, now, u->home + 3 * (size_t)v, SEATED)) || now >= SEATED) {
     return;
