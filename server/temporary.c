@@ -48,9 +48,11 @@ static owner **place_of(temporary *t, uint64_t hash) {
   return at;
 }
 
-/* others: bytes of the owner's other files. Were these deleted, the disk would have so much more room. */
-static temporary_room look(int64_t others, int64_t own, int64_t bytes, const temporary_limits *limits) {
-  const int64_t wanted = own + bytes, room = limits->room - bytes, most = limits->most;
+/* Under the lock. Were the owner's other files deleted, the disk would have so much more room. */
+static temporary_room look(temporary *t, const temporary_file *file, int64_t bytes, const temporary_limits *limits) {
+  const owner *who = *place_of(t, file->owner);
+  const int64_t others = (who ? who->bytes : 0) - file->bytes, wanted = file->bytes + bytes,
+                room = limits->room - bytes, most = limits->most;
   if (others + wanted <= room && (most == 0 || others + wanted <= most)) {
     return TEMPORARY_FREE;
   }
@@ -59,8 +61,7 @@ static temporary_room look(int64_t others, int64_t own, int64_t bytes, const tem
 
 temporary_room temporary_look(temporary *t, const temporary_file *file, int64_t bytes, const temporary_limits *limits) {
   pthread_mutex_lock(&t->lock);
-  const owner *who = *place_of(t, file->owner);
-  const temporary_room room = look((who ? who->bytes : 0) - file->bytes, file->bytes, bytes, limits);
+  const temporary_room room = look(t, file, bytes, limits);
   pthread_mutex_unlock(&t->lock);
   return room;
 }
@@ -83,8 +84,7 @@ temporary_room temporary_take(temporary *t, temporary_file *file, int64_t bytes,
     return TEMPORARY_FREE;
   }
   pthread_mutex_lock(&t->lock);
-  const owner *who = *place_of(t, file->owner);
-  temporary_room room = look((who ? who->bytes : 0) - file->bytes, file->bytes, bytes, limits);
+  temporary_room room = look(t, file, bytes, limits);
   if (room == TEMPORARY_FREE && !add(t, file, bytes)) {
     room = TEMPORARY_OTHERS;
   }
