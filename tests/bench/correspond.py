@@ -45,6 +45,7 @@ GIVEN_MOST = 24  # landmarks: however few are given, the same places are measure
 FORMAT = 3  # the version of the files in the store: after a change everything is measured
 THIN = (0, 0.005, 0.01)  # shares of the surface in patches that are thin halfway
 MORE_LANDMARKS = 1.05  # a pair with more landmarks is no worse if its mean error is at most this times as large
+KIND_COLUMNS = ["set", "kind", "version", "given", "pairs", "mean", "% diagonal"]
 CURVE = (1, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50)
 PAIR_COLUMNS = ["set", "pair", "kind", "half", "version", "given", "mean", "median", "95 %", "right", "% diagonal",
                 "energy", "confidence", "thin %", "CPU s"]
@@ -207,6 +208,18 @@ def groups(results):
             and not (key[1] == "both" and len(halves[key[0], key[2], key[3]]) == 2)}
 
 
+def kind_rows(results):
+    """Pairs by their kind: a person in two poses is another task than two people, or a giraffe and an elephant."""
+    found = {}
+    for pair, name, given, result in results:
+        if ", " not in name and "failed" not in result:
+            found.setdefault((pair.set, pair.kind, name, given), []).append(result)
+    return [[*key[:3], str(key[3]), str(len(value)),
+             number(statistics.mean(statistics.mean(r["errors"]) for r in value)),
+             number(statistics.mean(statistics.mean(r["diagonal"]) for r in value), 2)]
+            for key, value in sorted(found.items())]
+
+
 def confidence_rows(results):
     """Of the maps whose confidence lies in a range: how many are right. Versions without a confidence of the match have
     the mean of the found landmarks."""
@@ -273,6 +286,7 @@ def report(results):
     text += "\n## Curve\n\nThe share of the places, in %, with an error of at most:\n\n"
     text += table(["set", "half", "version", "given"] + [str(x) for x in CURVE],
                   [curve_row(list(k), v) for k, v in found.items()])
+    text += "\n## Kinds\n\n" + table(KIND_COLUMNS, kind_rows(results))
     confidence = confidence_rows(results)
     if confidence:
         text += "\n## Confidence\n\n" + table(["version", "confidence", "pairs", "right"], confidence)

@@ -145,6 +145,20 @@ class Correspond(unittest.TestCase):
         self.assertEqual(correspond.warning_rows(results), [["now", "more than 0.0 %", "2", "1"], ["now", "more than 0.5 %", "2", "1"],
                                                             ["now", "more than 1.0 %", "1", "0"]])
 
+    def test_pairs_are_summed_up_by_their_kind(self):
+        def pair(name, kind):
+            return correspond_pairs.Pair("people", name, kind, "choose", None, None, None)
+
+        def result(*errors):
+            return {"errors": errors, "diagonal": [error / 2 for error in errors]}
+
+        one, two, other = pair("a", "same person"), pair("b", "same person"), pair("c", "other person")
+        results = [(one, "now", 8, result(1, 2)), (two, "now", 8, result(4)), (other, "now", 8, result(6)),
+                   (one, "now, turned", 8, result(50)), (two, "now", 24, {"failed": "", "cpu": 1})]
+        self.assertEqual(correspond.kind_rows(results),
+                         [["people", "other person", "now", "8", "1", "6.0", "3.00"],
+                          ["people", "same person", "now", "8", "2", "2.8", "1.38"]])
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])
