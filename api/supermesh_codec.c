@@ -223,6 +223,9 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
     api_json_member_integer(out, "vertex", result->supermesh.landmark_vertices[l]);
     api_landmark_weight_write(&request->landmarks.items[l], out);
     write_numbers("residual_relative", result->landmark_residuals + (size_t)l * (size_t)shapes, shapes, out);
+    if (result->alignment.landmark_shares) {
+      api_json_member_number(out, "share", result->alignment.landmark_shares[l]);
+    }
     api_json_close(out, '}');
   }
   write_found(result, found, out);

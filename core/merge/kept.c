@@ -7,6 +7,7 @@
  *   int32 alternatives; for each double cost, int32 shape, int32 count, count × shapes places (int32 triangle,
  *     double[3])
  *   int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place
+ *   int32 1 and double share of each landmark, or 0
  *   int32 rims; for each int32 shape, and for either side int32 hole, int32 edges, double length; double off
  *   found × shapes places, found × double[3] points, found × double confidence
  *   for each shape: int32 vertices, triangles, changed; double[3] point of each vertex; position and int32 source of
@@ -23,11 +24,11 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { VERSION = 7, BYTE_ORDER_MARK = 0x01020304 };
+enum { VERSION = 8, BYTE_ORDER_MARK = 0x01020304 };
 static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 
 /* A new member of the alignment must be written and read here, with a new VERSION. */
-_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 144, "write and read the new member");
+_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 152, "write and read the new member");
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
                "write and read the new member");
 
@@ -175,6 +176,13 @@ static void put_suspects(writer *w, const orb_alignment *a) {
   }
 }
 
+static void put_shares(writer *w, const orb_alignment *a) {
+  put_integer(w, a->landmark_shares != NULL);
+  if (a->landmark_shares) {
+    put(w, a->landmark_shares, (size_t)a->landmark_count * sizeof *a->landmark_shares);
+  }
+}
+
 static void put_rims(writer *w, const orb_alignment *a) {
   put_integer(w, a->rim_count);
   for (int32_t i = 0; i < a->rim_count; i++) {
@@ -214,6 +222,7 @@ orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, 
   put(&w, &alignment->energy, sizeof alignment->energy);
   put_match(&w, alignment);
   put_suspects(&w, alignment);
+  put_shares(&w, alignment);
   put_rims(&w, alignment);
   put_found(&w, alignment);
   for (int32_t s = 0; s < alignment->shape_count; s++) {
@@ -491,6 +500,9 @@ static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *s
   out->found_count = found;
   ORB_TRY(take_match(ctx, r, shapes, out));
   ORB_TRY(take_suspects(ctx, r, shapes, out));
+  if (take_integer(r, 0, landmarks > 0)) {
+    out->landmark_shares = take_array(ctx, r, (size_t)landmarks, sizeof *out->landmark_shares);
+  }
   ORB_TRY(take_rims(ctx, r, shapes, out));
   if (found > 0) {
     ORB_TRY(take_found(ctx, r, shapes, out));

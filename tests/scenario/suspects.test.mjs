@@ -22,7 +22,10 @@ test('a landmark moved by 0.15 of the diagonal is named, and the true ones are n
     const options = ['--landmarks', marks, '-t', '0.02', '-o', path.join(at, 'out.glb'), '--report', report];
     const done = await run(['morph', dog, giraffe, ...options], { env });
     assert.equal(done.code, 0, done.err);
-    return { said: done.out, suspects: JSON.parse(await readFile(report, 'utf8')).suspects };
+    const { suspects, landmarks: met } = JSON.parse(await readFile(report, 'utf8'));
+    const shares = met.map(({ share }) => share);
+    assert.ok(Math.abs(shares.reduce((sum, share) => sum + share) - 1) < 1e-6, `${shares} are all of the distortion`);
+    return { said: done.out, suspects, shares };
   };
   const clean = await morph(landmarks);
   assert.deepEqual(clean.suspects, []);
@@ -31,7 +34,7 @@ test('a landmark moved by 0.15 of the diagonal is named, and the true ones are n
     const truth = placed(mesh, landmarks[moved].at[1]);
     const vertex = vertexBeside(mesh, landmarks, moved);
     const changed = landmarks.map((l, i) => (i === moved ? { ...l, at: [l.at[0], { vertex }] } : l));
-    const { said, suspects } = await morph(changed);
+    const { said, suspects, shares } = await morph(changed);
     const label = landmarks[moved].name;
     assert.deepEqual(
       suspects.map(({ landmark, name, shape }) => [landmark, name, shape]),
@@ -39,6 +42,7 @@ test('a landmark moved by 0.15 of the diagonal is named, and the true ones are n
     );
     const [{ at: meant, share, distance_relative: distance }] = suspects;
     assert.ok(share > 1 / landmarks.length && share <= 1, `${label}: ${share}`); // more than its part
+    assert.equal(shares[moved], share);
     const given = mesh.positions[vertex];
     assert.ok(Math.abs(apart(placed(mesh, meant), given) / diagonal - distance) < 1e-6);
     const left = apart(placed(mesh, meant), truth) / apart(given, truth);

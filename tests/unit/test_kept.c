@@ -59,6 +59,10 @@ static void check_same(const orb_alignment *a, const orb_alignment *b) {
     assert_true(x->distance == y->distance && x->at.triangle == y->at.triangle);
     assert_memory_equal(x->at.at, y->at.at, sizeof x->at.at);
   }
+  assert_int_equal(a->landmark_shares != NULL, b->landmark_shares != NULL);
+  if (a->landmark_shares) {
+    check_equal(a->landmark_shares, b->landmark_shares, (size_t)a->landmark_count, sizeof(double));
+  }
   for (size_t i = 0; i < found * shapes; i++) {
     assert_int_equal(a->found[i].triangle, b->found[i].triangle);
     assert_memory_equal(a->found[i].at, b->found[i].at, sizeof a->found[i].at);
@@ -107,6 +111,17 @@ static void align(bodies *b, orb_align_method method, int landmarks, orb_alignme
   assert_int_equal(orb_align(b->ctx, b->shape, 2, b->landmark, landmarks, &options, out), ORB_OK);
 }
 
+/* The preset fast measures none. */
+static void add_shares(bodies *b, orb_alignment *a) {
+  if (a->landmark_count > 0) {
+    a->landmark_shares = ORB_NEW(b->ctx, double, a->landmark_count);
+    assert_non_null(a->landmark_shares);
+  }
+  for (int32_t i = 0; i < a->landmark_count; i++) {
+    a->landmark_shares[i] = 1.0 / (1 + i);
+  }
+}
+
 static void what_is_read_was_written(void **state) {
   (void)state;
   static const struct {
@@ -122,6 +137,7 @@ static void what_is_read_was_written(void **state) {
       add_attributes(&b);
     }
     align(&b, cases[i].method, cases[i].landmarks, &made);
+    add_shares(&b, &made);
     made.match.is_part = made.match.is_measured; /* these bodies are no parts, but the member must be kept */
     assert_int_equal(orb_alignment_write(b.ctx, b.shape, &made, &bytes), ORB_OK);
     assert_int_equal(orb_alignment_read(b.ctx, bytes.data, bytes.size, b.shape, 2, &read), ORB_OK);

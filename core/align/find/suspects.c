@@ -272,6 +272,7 @@ static orb_status judge(orb_context *ctx, const orb_align_shape *shapes, const o
   ORB_GO(status, orb_tasks_run(ctx, 2, drift_from, &q), done);
   ORB_GO(status, measure_shares(ctx, &q.sides[0], landmarks, count, cap, share), done);
   for (int32_t i = 0; i < count; i++) {
+    out->landmark_shares[i] = fmax(out->landmark_shares[i], share[i]);
     if (fmin(q.drift[0][i], q.drift[1][i]) >= DRIFT_LEAST) {
       add_suspect(out, &(orb_suspect){i, shape, share[i], q.end[0][i], q.drift[0][i]});
     }
@@ -293,7 +294,8 @@ orb_status orb_align_suspects(orb_context *ctx, const orb_align_shape *shapes, c
     return ORB_OK;
   }
   out->suspects = ORB_NEW0(ctx, orb_suspect, ORB_SUSPECTS_MAX);
-  orb_status status = out->suspects ? ORB_OK : ORB_E_NO_MEMORY;
+  out->landmark_shares = ORB_NEW0(ctx, double, out->landmark_count);
+  orb_status status = out->suspects && out->landmark_shares ? ORB_OK : ORB_E_NO_MEMORY;
   for (int32_t s = 1; s < out->shape_count && status == ORB_OK; s++) {
     status = judge(ctx, shapes, landmarks, s, params.energy.cap, out);
   }

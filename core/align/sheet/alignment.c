@@ -19,6 +19,7 @@ void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   }
   orb_free(ctx, alignment->alternatives);
   orb_free(ctx, alignment->suspects);
+  orb_free(ctx, alignment->landmark_shares);
   orb_free(ctx, alignment->rims);
   memset(alignment, 0, sizeof *alignment);
 }

@@ -120,6 +120,9 @@ typedef struct orb_alignment {
   orb_alternative *alternatives;
   int32_t suspect_count; /* at most ORB_SUSPECTS_MAX, by falling distance */
   orb_suspect *suspects;
+  /* landmark_count: the share of the distortion that lies around each given landmark, as of a suspect; with several
+   * later shapes, the largest. NULL where no suspects are looked for: the map is good, or landmarks are fewer than 4 */
+  double *landmark_shares;
   int32_t rim_count;
   orb_rim_match *rims; /* by rising number of the shape */
 } orb_alignment;
