@@ -408,6 +408,13 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   write_shapes(id, request, result, out);
   write_landmarks(request, result, found, out);
   write_suspects(request, &result->alignment, meant, out);
+  char alignment[API_ID_SIZE];
+  if (api_alignment_id(request, alignment)) {
+    api_json_member_string(out, "alignment", alignment);
+  }
+  if (request->start[0]) {
+    api_json_member_bool(out, "start_followed", result->alignment.has_followed);
+  }
   write_match(&result->alignment.match, out);
   write_alternatives(request, &result->alignment, others, out);
   api_json_key(out, "certificate");

@@ -84,8 +84,26 @@ static int read_shapes(const cJSON *list, api_supermesh_request *out, api_proble
   return 1;
 }
 
+static int read_start(const cJSON *start, api_supermesh_request *out, api_problem *problem) {
+  const orb_align_method method = out->merge.align.method;
+  if (!start) {
+    return 1;
+  }
+  if (!cJSON_IsString(start) || !api_id_valid(start->valuestring, strlen(start->valuestring))) {
+    return api_refuse(problem, "invalid-request",
+                      "\"align.start\" must be what the member \"alignment\" of a supermesh has.");
+  }
+  if (out->landmarks.count == 0 || (method != ORB_ALIGN_PIN && method != ORB_ALIGN_AUTO)) {
+    return api_refuse(problem, "invalid-request",
+                      "Only the methods pin and auto begin with another alignment, and only with landmarks. Add some, "
+                      "or leave \"align.start\" out.");
+  }
+  memcpy(out->start, start->valuestring, sizeof out->start);
+  return 1;
+}
+
 static int read_align(cJSON *align, api_supermesh_request *out, api_problem *problem) {
-  static const char *const known[] = {"method", "options", NULL};
+  static const char *const known[] = {"method", "options", "start", NULL};
   out->merge.align.method = out->landmarks.count ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
   if (align) {
     if (!cJSON_IsObject(align)) {
@@ -114,7 +132,7 @@ static int read_align(cJSON *align, api_supermesh_request *out, api_problem *pro
                       "The alignment method \"%s\" requires landmarks. Add some, or choose auto or rotate.",
                       aligns[method]);
   }
-  return 1;
+  return read_start(align ? cJSON_GetObjectItemCaseSensitive(align, "start") : NULL, out, problem);
 }
 
 /* "template": which meshes and nodes of the first shape's document the closed surface consists of. */
@@ -271,6 +289,9 @@ static void write_embedding_and_align(const api_supermesh_request *request, api_
   api_json_member_string(out, "method", aligns[request->merge.align.method]);
   api_json_key(out, "options");
   api_options_write(out, align_table, COUNT(align_table), &request->merge.align, NULL);
+  if (request->start[0]) {
+    api_json_member_string(out, "start", request->start);
+  }
   api_json_close(out, '}');
 }
 

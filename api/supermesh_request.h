@@ -16,6 +16,7 @@ typedef struct api_supermesh_request {
     char name[ORB_NAME_MAX]; /* empty: the name of the mesh */
   } shapes[API_SHAPES_MAX];
   api_landmark_list landmarks;
+  char start[API_ID_SIZE];     /* "align.start": the alignment to begin with; empty: none */
   orb_embed_options embedding; /* for every shape */
   orb_merge_options merge;     /* without file_parts, see api_supermesh_request_parts(), and carries */
   struct api_parts_spec {

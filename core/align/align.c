@@ -399,6 +399,67 @@ static double expected_steps(const orb_align_shape *shapes, int32_t shape_count,
   return steps;
 }
 
+/* Is it an alignment of shapes with these meshes, which it may have divided further? */
+static int is_of(const orb_alignment *start, const orb_align_shape *shapes, int32_t shape_count) {
+  int fits = start->shape_count == shape_count;
+  for (int32_t s = 0; s < shape_count && fits; s++) {
+    const orb_mesh *given = shapes[s].mesh, *mesh = &start->shapes[s].mesh;
+    fits = mesh->vertex_count - given->vertex_count == (mesh->triangle_count - given->triangle_count) / 2 &&
+           mesh->vertex_count >= given->vertex_count &&
+           memcmp(mesh->positions, given->positions, 3 * (size_t)given->vertex_count * sizeof *given->positions) == 0;
+  }
+  return fits;
+}
+
+static orb_status follow(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                         const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                         const orb_alignment *start, orb_alignment *out) {
+  int followed;
+  ORB_TRY(orb_align_follow(ctx, shapes, shape_count, landmarks, landmark_count, options, start, out, &followed));
+  if (!followed) {
+    return ORB_OK;
+  }
+  out->has_followed = 1;
+  ORB_TRY(orb_align_rims(ctx, options, out));
+  return describe(ctx, shapes, landmarks, landmark_count, options, out->energy, out);
+}
+
+static orb_status check_start(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                              int32_t landmark_count, const orb_align_options *options, const orb_alignment *start) {
+  if (landmark_count == 0 || shape_count < 2 ||
+      (options->method != ORB_ALIGN_PIN && options->method != ORB_ALIGN_AUTO)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "Only the methods pin and auto begin with another alignment, and only with landmarks and two "
+                    "shapes or more.");
+  }
+  if (!is_of(start, shapes, shape_count)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "The alignment to begin with is of other shapes, or of another order.");
+  }
+  return ORB_OK;
+}
+
+orb_status orb_align_again(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                           const orb_alignment *start, orb_alignment *out) {
+  memset(out, 0, sizeof *out);
+  ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
+  ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
+  ORB_TRY(check_start(ctx, shapes, shape_count, landmark_count, options, start));
+  const char *before = orb_progress_only(ctx, "align");
+  orb_progress_expect(ctx, expected_steps(shapes, shape_count, options));
+  orb_status status = follow(ctx, shapes, shape_count, landmarks, landmark_count, options, start, out);
+  const int followed = out->has_followed;
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
+  } else if (followed) {
+    orb_progress(ctx, "align", 1);
+  }
+  orb_progress_expect(ctx, 0);
+  (void)orb_progress_only(ctx, before);
+  return status != ORB_OK || followed ? status
+                                      : orb_align(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+}
+
 orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                      const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                      orb_alignment *out) {

@@ -16,7 +16,7 @@
  *   given/   method.c: one method with the given landmarks, and the composed maps of an alignment; part.c: landmarks
  *            that hold a part of the other shape; by_landmarks.c: a part, or two ways to align by landmarks, of which
  *            the better one wins; given.c: one of these, then soft landmarks are released, and copies are extended to
- *            their shapes
+ *            their shapes; again.c: from an earlier alignment, after landmarks have changed
  *   auto/    auto.c: method `auto`, the rotation search, composed towards the matches of find/; held.c: pairs of a
  *            match, held like landmarks
  *   align.c  orb_align(): checks the request, chooses between given/ and auto/, and aligns copies of large shapes
@@ -54,6 +54,19 @@ ORB_MUST_CHECK orb_status orb_align_by_landmarks(orb_context *ctx, const orb_ali
 ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                           const orb_landmark *landmarks, int32_t landmark_count,
                                           const orb_align_options *options, orb_alignment *out);
+
+/* Soft landmarks say where to look, not where to end. They were pinned with the others, so that the map takes each limb
+ * to its limb. Now the map is composed once more with them free, and a spring pulls the places of each together. What
+ * is held for a part, after these landmarks, stays held. */
+ORB_MUST_CHECK orb_status orb_align_soften(orb_context *ctx, const orb_landmark *landmarks, int32_t count,
+                                           orb_preset preset, orb_alignment *alignment);
+
+/* Aligns from where another alignment of these shapes has ended (given/again.c). *followed 0: the landmarks lead far
+ * away from it, or have no room on its spheres; `out` is then empty. */
+ORB_MUST_CHECK orb_status orb_align_follow(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                           const orb_landmark *landmarks, int32_t landmark_count,
+                                           const orb_align_options *options, const orb_alignment *start,
+                                           orb_alignment *out, int *followed);
 
 /* The same with `pin`, for pairs of a match that has led to no good map: tries neither a landmark walk alone nor the
  * match again. */

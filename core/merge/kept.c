@@ -2,7 +2,7 @@
  * the given mesh keep their numbers, positions and sources, and most triangles are the same.
  *
  *   char[8] "ORBALIGN", uint32 version, uint32 0x01020304 (byte order)
- *   int32 shapes, landmarks, found; double energy
+ *   int32 shapes, landmarks, found, followed; double energy
  *   int32 1, int32 part and double bend, clear, lead, confidence of the match, or 0
  *   int32 alternatives; for each double cost, int32 shape, int32 count, count × shapes places (int32 triangle,
  *     double[3])
@@ -219,6 +219,7 @@ orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, 
   put_integer(&w, alignment->shape_count);
   put_integer(&w, alignment->landmark_count);
   put_integer(&w, alignment->found_count);
+  put_integer(&w, alignment->has_followed);
   put(&w, &alignment->energy, sizeof alignment->energy);
   put_match(&w, alignment);
   put_suspects(&w, alignment);
@@ -487,6 +488,7 @@ static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *s
   (void)take_integer(r, BYTE_ORDER_MARK, BYTE_ORDER_MARK);
   (void)take_integer(r, shape_count, shape_count);
   const int32_t landmarks = take_integer(r, 0, 1 << 20), found = take_integer(r, 0, ORB_FOUND_MAX);
+  out->has_followed = take_integer(r, 0, 1);
   take(r, &out->energy, sizeof out->energy);
   if (r->bad) {
     return ORB_OK;

@@ -11,7 +11,7 @@
 #include "isolate/task.h"
 #include "worker/run.h"
 
-enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, PROGRESS_MS = 20, KEPT_BYTES = 16 << 20 };
+enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 2, PROGRESS_MS = 20, KEPT_BYTES = 16 << 20 };
 
 typedef struct input {
   input_head head;

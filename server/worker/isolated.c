@@ -12,7 +12,7 @@
 #include "store/object_removal.h"
 #include "store/verify.h"
 
-enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 2 };
+enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 3 };
 
 typedef struct collected {
   resource_key keys[INPUTS_MOST];
@@ -70,6 +70,9 @@ static void want_all(api_job_kind kind, const run_job *j, collected *all) {
       if (api_embedding_request_id(&wanted, embedding)) {
         want(all, RESOURCE_EMBEDDING, OBJECT_SPHERE, embedding);
       }
+    }
+    if (merge.start[0]) {
+      want(all, RESOURCE_ALIGNMENT, OBJECT_ALIGNMENT, merge.start);
     }
     if (api_alignment_id(&merge, all->alignment)) {
       want(all, RESOURCE_ALIGNMENT, OBJECT_ALIGNMENT, all->alignment);

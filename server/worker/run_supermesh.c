@@ -274,9 +274,33 @@ static int store_result_of(const run_env *env, orb_context *ctx, const run_job *
   return 1;
 }
 
+/* Aligns again, from the alignment that the request names. It never aligns anew instead, since the same request gives
+ * the same result. */
+static int align_again(const run_env *env, orb_context *ctx, const merge_input *in, orb_alignment *out,
+                       api_problem *problem) {
+  const api_supermesh_request *request = &in->request;
+  resource row = {0};
+  orb_alignment start = {0};
+  const int kept = run_get(env, RESOURCE_ALIGNMENT, request->start, &row) == STORE_OK &&
+                   alignments_get(env->cat, env->store, ctx, &row, in->shapes, request->shape_count, &start);
+  resource_free(&row);
+  if (!kept) {
+    api_refuse(
+        problem, "bad-option",
+        "The alignment that \"align.start\" names is no longer kept, or is of other shapes. Leave \"start\" out: "
+        "the shapes are then aligned anew.");
+    api_json_member_string(&problem->facts, "member", "start");
+    return 0;
+  }
+  const orb_status status = orb_align_again(ctx, in->shapes, request->shape_count, in->landmarks,
+                                            request->landmarks.count, &request->merge.align, &start, out);
+  orb_alignment_free(ctx, &start);
+  return status == ORB_OK;
+}
+
 /* Takes the kept alignment, or computes one and keeps it. *seconds: how long computing took, 0 if it was kept. */
 static int align_shapes(const run_env *env, orb_context *ctx, const merge_input *in, orb_alignment *out,
-                        double *seconds) {
+                        double *seconds, api_problem *problem) {
   const api_supermesh_request *request = &in->request;
   char id[API_ID_SIZE];
   const int named = api_alignment_id(request, id);
@@ -291,8 +315,12 @@ static int align_shapes(const run_env *env, orb_context *ctx, const merge_input 
     }
   }
   const double began = orb_clock();
-  if (orb_align(ctx, in->shapes, request->shape_count, in->landmarks, request->landmarks.count, &request->merge.align,
-                out) != ORB_OK) {
+  if (request->start[0]) {
+    if (!align_again(env, ctx, in, out, problem)) {
+      return 0;
+    }
+  } else if (orb_align(ctx, in->shapes, request->shape_count, in->landmarks, request->landmarks.count,
+                       &request->merge.align, out) != ORB_OK) {
     return 0;
   }
   *seconds = orb_clock() - began;
@@ -302,11 +330,12 @@ static int align_shapes(const run_env *env, orb_context *ctx, const merge_input 
   return 1;
 }
 
-static int merge(const run_env *env, orb_context *ctx, const merge_input *in, orb_merge_result *out) {
+static int merge(const run_env *env, orb_context *ctx, const merge_input *in, orb_merge_result *out,
+                 api_problem *problem) {
   orb_alignment alignment;
   double seconds;
   if (orb_merge_check(ctx, in->shapes, in->request.shape_count, &in->request.merge) != ORB_OK ||
-      !align_shapes(env, ctx, in, &alignment, &seconds) ||
+      !align_shapes(env, ctx, in, &alignment, &seconds, problem) ||
       orb_merge_aligned(ctx, in->shapes, in->names, in->request.shape_count, in->landmarks, &alignment,
                         &in->request.merge, out) != ORB_OK) {
     return 0;
@@ -328,8 +357,8 @@ int run_supermesh(const run_env *env, orb_context *ctx, const run_job *j, run_ou
     return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   memset(&merged, 0, sizeof merged);
-  int fine =
-      read_request(j, &in->request, problem) && load_input(env, ctx, in, problem) && merge(env, ctx, in, &merged);
+  int fine = read_request(j, &in->request, problem) && load_input(env, ctx, in, problem) &&
+             merge(env, ctx, in, &merged, problem);
   if (fine) {
     for (int32_t s = 0; s < in->request.shape_count; s++) {
       out->flips += merged.alignment.shapes[s].certificate.flipped;

@@ -41,6 +41,7 @@ static void check_same(const orb_alignment *a, const orb_alignment *b) {
   assert_int_equal(a->shape_count, b->shape_count);
   assert_int_equal(a->landmark_count, b->landmark_count);
   assert_int_equal(a->found_count, b->found_count);
+  assert_int_equal(a->has_followed, b->has_followed);
   assert_memory_equal(&a->energy, &b->energy, sizeof a->energy); /* also NaN */
   assert_memory_equal(&a->match, &b->match, sizeof a->match);
   assert_int_equal(a->alternative_count, b->alternative_count);
@@ -138,6 +139,7 @@ static void what_is_read_was_written(void **state) {
     }
     align(&b, cases[i].method, cases[i].landmarks, &made);
     add_shares(&b, &made);
+    made.has_followed = made.landmark_count > 0;
     made.match.is_part = made.match.is_measured; /* these bodies are no parts, but the member must be kept */
     assert_int_equal(orb_alignment_write(b.ctx, b.shape, &made, &bytes), ORB_OK);
     assert_int_equal(orb_alignment_read(b.ctx, bytes.data, bytes.size, b.shape, 2, &read), ORB_OK);

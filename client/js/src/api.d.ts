@@ -224,6 +224,8 @@ export type SupermeshRequest = {
   align?: {
     /** Default: pin with landmarks, auto without. pin and rbf require landmarks. */
     method?: 'pin' | 'rbf' | 'rotate' | 'auto';
+    /** The member alignment of a supermesh of the same meshes, in the same order: begin where that alignment ended. For landmarks that were corrected: nothing is searched, so it takes a fraction of the time, and limbs stay where they are. Needs landmarks, and the method pin or auto. The problem bad-option with the member start says that the alignment is no longer kept. */
+    start?: string;
     options?: {
       /** Default: "default". */
       preset?: 'default' | 'fast' | 'quality';
@@ -299,6 +301,8 @@ export type CanonicalRequest = {
   };
   align: {
     method: 'pin' | 'rbf' | 'rotate' | 'auto';
+    /** Only if the request has it. */
+    start?: string;
     options: {
       preset: 'default' | 'fast' | 'quality';
       /** For rbf: the number of steps of a pass. */
@@ -439,6 +443,10 @@ export type Supermesh = {
     /** From 0 to 1. */
     confidence: number | null;
   }>;
+  /** The alignment, for align.start of a request with other landmarks. Absent if an older engine made the supermesh. */
+  alignment?: string;
+  /** Only if the request has align.start: whether the map follows that alignment. false: the landmarks lead far away from it, so the shapes were aligned anew. */
+  start_followed?: boolean;
   /** Landmarks of the request that may be misplaced, by falling distance; empty if the map is good, or its energy was not measured. Absent if an older engine made the supermesh. */
   suspects?: Array<{
     /** An index into the landmarks. */

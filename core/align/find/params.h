@@ -18,6 +18,10 @@ static const double ORB_FIND_STEPS_MAP = 1e6, ORB_FIND_STEPS_VERTEX = 500, ORB_F
 /* The same for each vertex where no map is composed: three stages of a walk (pin/walk.c), or a rotation. */
 static const double ORB_FIND_STEPS_PLACED = 60;
 
+/* Alignments that begin with another one (given/again.c). One that has more energy above 1 than TIMES that of its
+ * start, and MORE, is aligned anew: a landmark was moved to another limb, or the start was wrong. */
+static const double ORB_AGAIN_TIMES = 2, ORB_AGAIN_MORE = 0.2;
+
 /* Matches (match.c). */
 
 enum {

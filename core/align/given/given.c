@@ -46,11 +46,8 @@ static void free_landmarks(const orb_landmark *landmarks, int32_t count, orb_ali
   }
 }
 
-/* Soft landmarks say where to look, not where to end. They were pinned with the others, so that the map takes each limb
- * to its limb. Now the map is composed once more with them free, and a spring pulls the places of each together. What
- * is held for a part, after these landmarks, stays held. */
-static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, int32_t count, orb_preset preset,
-                         orb_alignment *alignment) {
+orb_status orb_align_soften(orb_context *ctx, const orb_landmark *landmarks, int32_t count, orb_preset preset,
+                            orb_alignment *alignment) {
   const int32_t soft = orb_landmarks_soft(landmarks, count);
   if (soft == 0 || alignment->shape_count < 2) {
     return ORB_OK;
@@ -92,7 +89,7 @@ static orb_status align_and_compose(orb_context *ctx, const orb_align_shape *sha
     }
   }
   if (status == ORB_OK) {
-    status = soften(ctx, landmarks, landmark_count, options->preset, out);
+    status = orb_align_soften(ctx, landmarks, landmark_count, options->preset, out);
   }
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);

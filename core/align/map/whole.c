@@ -89,6 +89,7 @@ orb_map_run orb_map_run_of(orb_context *ctx, orb_aligned_shape *fixed, orb_align
                        .landmark_count = landmark_count,
                        .given_target = guide->target,
                        .keeps_angles = guide->keeps_angles,
+                       .slides = guide->slides,
                        .may_fit_parts = guide->fits_parts,
                        .beat = guide->beat,
                        .rival = guide->rival,
@@ -173,7 +174,7 @@ static int should_slide(const orb_map_run *c, orb_map_from from) {
   if ((c->walks_first && c->course.is_walked) || c->best_energy <= c->params.slide.least) {
     return 0;
   }
-  return (c->given_target || from == ORB_MAP_FROM_WALK) &&
+  return (c->given_target || c->slides || from == ORB_MAP_FROM_WALK) &&
          (c->best_energy <= c->params.energy.poor || (c->given_target && c->keeps_angles));
 }
 

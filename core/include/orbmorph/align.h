@@ -47,6 +47,20 @@ ORB_API ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_sh
                                             const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_align_options *options, orb_alignment *out);
 
+/* Aligns shapes again after landmarks were moved, added or removed. Begins where another alignment of the same shapes,
+ * in the same order, has ended, so limbs stay where it has them, and nothing is searched: that takes a tenth to a
+ * thirtieth of the time. start: of orb_align() or of this function, by any method. Usually its found landmarks are
+ * corrected and given here.
+ *
+ * out->has_followed 1: the map follows the start. 0: it could not, since the landmarks lead far away from it or have no
+ * room on its spheres; the shapes were then aligned by orb_align(). Errors are those of orb_align(). ORB_E_BAD_OPTION
+ * also: a start of other shapes, no landmarks, one shape, or another method than pin or auto. About linear in
+ * triangles. */
+ORB_API ORB_MUST_CHECK orb_status orb_align_again(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                                  const orb_landmark *landmarks, int32_t landmark_count,
+                                                  const orb_align_options *options, const orb_alignment *start,
+                                                  orb_alignment *out);
+
 #ifdef __cplusplus
 }
 #endif

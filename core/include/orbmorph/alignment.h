@@ -116,6 +116,7 @@ typedef struct orb_alignment {
   double energy;      /* symmetric Dirichlet energy of the composed maps, capped for each triangle and weighted by area;
                          lower is better; NaN if not measured */
   orb_match_facts match;
+  int32_t has_followed;      /* 1: of orb_align_again(), and follows its start */
   int32_t alternative_count; /* at most ORB_ALTERNATIVES_MAX, by rising cost */
   orb_alternative *alternatives;
   int32_t suspect_count; /* at most ORB_SUSPECTS_MAX, by falling distance */

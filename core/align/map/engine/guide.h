@@ -75,6 +75,7 @@ typedef struct orb_map_guide {
   int keeps_angles;     /* the spheres do (sheet/even.h); then embeddings made on the way do as well, and the places of
                            the targets are smoothed */
   orb_map_beat beat;    /* with a target */
+  int slides;           /* the map slides at the end (space/slide.h), also without a target */
   int fits_parts;       /* the landmarks may show that only parts of the shapes correspond (space/part.h) */
   orb_map_course *course; /* NULL, or set; the bulks with a target only */
   orb_map_rival rival;    /* with a target: asked if the first start leaves open which way is better */

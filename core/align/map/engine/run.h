@@ -81,6 +81,7 @@ typedef struct orb_map_run {
   double *start;    /* points of a map in which all pairs meet, mesh order: as given, later as walked */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
+  int slides;        /* see orb_map_guide */
   int may_fit_parts; /* see orb_map_guide */
   double hopeless;   /* a start whose first map has more energy is given up */
   double crumpled;   /* a start whose energy rises by more than this factor while flips are cleared is given up, */
