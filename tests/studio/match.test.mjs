@@ -210,5 +210,9 @@ test('an unsure match is labelled, and the next match gives another morph', asyn
     async () => (await hint.innerText()) === `${first.landmarks.length} landmarks will meet exactly.`,
     'given',
   );
+  // what only corrects a match begins where that match ended
+  const second = await morphed(page);
+  assert.equal(second.request.align.start, first.alignment);
+  assert.equal(second.start_followed, true);
   await done();
 });

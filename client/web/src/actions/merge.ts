@@ -33,6 +33,27 @@ import { player } from '../player';
 import { listFound, takeLandmarks } from './landmarks';
 import { explain } from './token';
 
+/** The last alignment, with the meshes and landmarks that it is of. */
+let last: { alignment: string; meshes: string; landmarks: string; start?: string } | null = null;
+
+const meshesOf = ({ shapes }: { shapes: { mesh: string }[] }) => shapes.map(({ mesh }) => mesh).join();
+
+const marksOf = (request: SupermeshRequest | null) =>
+  Array.isArray(request?.landmarks) ? JSON.stringify(request.landmarks.map(({ at, weight }) => [at, weight])) : '';
+
+function noteAlignment(supermesh: Supermesh, request: SupermeshRequest | null) {
+  const { alignment } = supermesh;
+  last = alignment
+    ? { alignment, meshes: meshesOf(supermesh), landmarks: marksOf(request), start: request?.align?.start }
+    : null;
+}
+
+/** Where the alignment of a request begins: with corrected landmarks, where the last one ended; with the same, as that. */
+function startOf(request: SupermeshRequest) {
+  if (!last || last.meshes !== meshesOf(request)) return undefined;
+  return last.landmarks === marksOf(request) ? last.start : last.alignment;
+}
+
 export function buildRequest(find = false): SupermeshRequest {
   const { options } = state;
   const shapes = readyShapes();
@@ -41,6 +62,8 @@ export function buildRequest(find = false): SupermeshRequest {
   if (find) request.landmarks = 'auto';
   else if (landmarks.length) request.landmarks = landmarks;
   if (!find && options.align !== 'default') request.align = { method: options.align };
+  const start = Array.isArray(request.landmarks) && !['rbf', 'rotate'].includes(options.align) && startOf(request);
+  if (start) request.align = { ...request.align, start };
   request.remesh = { method: options.remesh, tolerance: options.tolerance };
   if (options.maxTriangles && options.remesh !== 'template') request.remesh.max_triangles = options.maxTriangles;
   request.asset = { fit: find ? 'none' : options.fit };
@@ -86,10 +109,14 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
   const request = buildRequest(purpose === 'find');
   const fast = purpose === 'morph' ? fastRequest(request) : null;
   if (fast) await showFast(running, fast);
+  const { start, ...align } = request.align ?? {};
+  const send = (sent: SupermeshRequest) =>
+    client.merge(sent, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) });
+  // the daemon keeps alignments for a time only
+  const isForgotten = (error: unknown) => !!start && error instanceof ProblemError && error.problem.member === 'start';
   await follow(
     running,
-    () =>
-      client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }),
+    () => send(request).catch((error) => (isForgotten(error) ? send({ ...request, align }) : Promise.reject(error))),
     request,
   );
 }
@@ -276,6 +303,7 @@ async function takeFound(supermesh: Supermesh) {
     ? []
     : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
   const found = named.length ? named : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
+  noteAlignment(supermesh, null);
   const taken = await takeLandmarks(found, { snap: true });
   set({ tab: 'landmarks' });
   toast(`${taken} landmarks found. Drag any that are off.`);
@@ -338,6 +366,7 @@ export async function openResult(
       model.color(tint(i));
     });
     set({ result, mix: null });
+    if (!isFast(result)) noteAlignment(supermesh, request);
     player.load(result);
     void tellOthers(result);
     if (!isFast(result) && isOfPage(supermesh) && before?.supermesh.id !== supermesh.id)
