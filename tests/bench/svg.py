@@ -1,4 +1,4 @@
-"""Small plots as SVG text: lines and bars, with axes of round numbers."""
+"""Small plots as SVG text: lines, bars and shares, with axes of round numbers."""
 import math
 from html import escape
 
@@ -57,3 +57,24 @@ def bars(edges, counts, x_name, y_name):
                    f'height="{py(0) - py(count):.1f}" fill="{COLORS[0]}"/>')
 
     return frame(body, (edges[0], edges[-1]), (0, max(counts) * 1.05 or 1), x_name, y_name)
+
+
+def shares(series, x_name, y_name):
+    """Expected shares against measured ones, both from 0 to 1, with the diagonal on which they are equal. Each of series
+    is (name, [(expected, measured, (lowest, highest), number)…]). The numbers of the first series stand at the
+    right of its points, those of the second at the left, so that neither hides the other."""
+    def body(px, py):
+        yield (f'<path d="M{px(0):.1f} {py(0):.1f}L{px(1):.1f} {py(1):.1f}" stroke="#888" stroke-dasharray="5 4"/>'
+               f'<text x="{px(0.55):.1f}" y="{py(0.55) + 24:.1f}" fill="#666">as predicted</text>')
+        for i, (name, points) in enumerate(series):
+            color, fill = COLORS[i], "#fff" if i else COLORS[i]
+            yield f'<text x="{LEFT + 10}" y="{TOP + 14 + 16 * i}" fill="{color}">{escape(name)}</text>'
+            for x, y, (low, high), count in points:
+                place = f'x="{px(x) - 7:.1f}" y="{py(low) + 10:.1f}" text-anchor="end"' if i else \
+                    f'x="{px(x) + 7:.1f}" y="{py(high) + 4:.1f}"'
+                yield (f'<path d="M{px(x):.1f} {py(low):.1f}V{py(high):.1f}" stroke="{color}" stroke-width="{2 - i}"/>'
+                       f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="{4 + i}" fill="{fill}" fill-opacity="{1 - i}" '
+                       f'stroke="{color}" stroke-width="2"/>'
+                       f'<text {place} fill="{color}">{count}</text>')
+
+    return frame(body, (0, 1), (0, 1.08), x_name, y_name)
