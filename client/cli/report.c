@@ -75,18 +75,44 @@ static void percent(double fraction, char out[32]) {
   }
 }
 
-/* The largest distance of a landmark from its given place, as a fraction of the diagonal. */
-static double worst_residual(const cJSON *supermesh) {
-  double worst = 0;
+/* The landmarks of one kind, and the largest distance of one from its given place, as a fraction of the diagonal. */
+typedef struct landmark_group {
+  int count;
+  double worst;
+} landmark_group;
+
+/* A weight below 1 lets a landmark give way. The daemon writes it only then. */
+static int is_soft(const cJSON *landmark) {
+  return cli_number(landmark, "weight") < 1;
+}
+
+static landmark_group landmarks_of(const cJSON *supermesh, int soft) {
+  landmark_group group = {0};
   const cJSON *landmark, *residual;
   cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
+    if (is_soft(landmark) != soft) {
+      continue;
+    }
+    group.count++;
     cJSON_ArrayForEach(residual, member(landmark, "residual_relative")) {
-      if (cJSON_IsNumber(residual) && residual->valuedouble > worst) {
-        worst = residual->valuedouble;
+      if (cJSON_IsNumber(residual) && residual->valuedouble > group.worst) {
+        group.worst = residual->valuedouble;
       }
     }
   }
-  return worst;
+  return group;
+}
+
+/* "1 soft landmark, up to 4.68 % of the diagonal from its place". The comma is the link for one and for several. */
+static void write_soft(FILE *out, landmark_group soft, const char *one, const char *several) {
+  const int is_one = soft.count == 1;
+  char worst[32], apart[64] = "at";
+  if (soft.worst >= ROUNDING) {
+    percent(soft.worst, worst);
+    snprintf(apart, sizeof apart, "up to %s of the diagonal from", worst);
+  }
+  fprintf(out, "%d soft landmark%s%s %s %s", soft.count, is_one ? "" : "s", is_one ? one : several, apart,
+          is_one ? "its place" : "their places");
 }
 
 /* The daemon found the landmarks: the request gave none. */
@@ -163,6 +189,26 @@ static void surface_of(const cJSON *supermesh, char out[64]) {
   }
 }
 
+/* A line about the landmarks of the request. Only those that had to meet are exact or not. */
+static void print_landmarks(const cJSON *supermesh) {
+  const landmark_group firm = landmarks_of(supermesh, 0), soft = landmarks_of(supermesh, 1);
+  char worst[32];
+  fputs("  ", stdout);
+  if (firm.count) {
+    percent(firm.worst, worst);
+    printf("%d landmark%s, %s (distance at most %s)", firm.count, firm.count > 1 ? "s" : "",
+           were_guessed(supermesh)                                                     ? "from a found match"
+           : cJSON_IsTrue(member(member(supermesh, "certificate"), "landmarks_exact")) ? "exact"
+                                                                                       : "not exact",
+           worst);
+  }
+  if (soft.count) {
+    fputs(firm.count ? "; " : "", stdout);
+    write_soft(stdout, soft, ",", ",");
+  }
+  putchar('\n');
+}
+
 void cli_print_supermesh(const cJSON *supermesh) {
   char vertices[32], triangles[32], error[32], rms[32], surface[64];
   const cJSON *shape, *certificate = member(supermesh, "certificate");
@@ -188,12 +234,7 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  %d landmarks found; 'orbmorph get %s --json' prints them\n", landmarks,
            cli_string(supermesh, "url", "?"));
   } else if (landmarks) {
-    percent(worst_residual(supermesh), error);
-    printf("  %d landmarks, %s (distance at most %s)\n", landmarks,
-           were_guessed(supermesh)                                ? "from a found match"
-           : cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact"
-                                                                  : "not exact",
-           error);
+    print_landmarks(supermesh);
   }
   int dropped = cJSON_GetArraySize(member(supermesh, "dropped"));
   if (dropped) {
@@ -294,6 +335,56 @@ static void markdown_numbers(FILE *out, const char *title, const cJSON *object) 
   fputc('\n', out);
 }
 
+/* How well the landmarks meet, in sentences. */
+static void markdown_meeting(FILE *out, const cJSON *supermesh) {
+  const landmark_group firm = landmarks_of(supermesh, 0), soft = landmarks_of(supermesh, 1);
+  if (were_found(supermesh)) {
+    fputs("The request gave no landmarks; orbmorph found these. Check them before you rely on the result.", out);
+    return;
+  }
+  if (firm.count) {
+    const int is_met = cJSON_IsTrue(member(member(supermesh, "certificate"), "landmarks_exact"));
+    if (soft.count) {
+      fprintf(out, "%d landmark%s", firm.count, firm.count > 1 ? "s" : "");
+    } else {
+      fputs(is_met && !were_guessed(supermesh) ? "All landmarks" : "The landmarks", out);
+    }
+    fputs(!is_met                   ? " coincide only approximately."
+          : were_guessed(supermesh) ? " coincide. They come from a match that orbmorph found."
+                                    : " coincide exactly.",
+          out);
+  }
+  if (soft.count) {
+    fputs(firm.count ? " " : "", out);
+    write_soft(out, soft, " stays", " stay");
+    fputs(".", out);
+  }
+}
+
+static void markdown_landmarks(FILE *out, const cJSON *supermesh) {
+  const cJSON *landmark, *residual;
+  if (!cJSON_GetArraySize(member(supermesh, "landmarks"))) {
+    return;
+  }
+  fputs("\n## Landmarks\n\n", out);
+  markdown_meeting(out, supermesh);
+  fputs("\n\n| landmark | distance on each shape |\n|---|---|\n", out);
+  cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
+    fputs("| ", out);
+    markdown_text(out, cli_string(landmark, "name", ""));
+    if (is_soft(landmark)) {
+      fprintf(out, " (weight %.3g)", cli_number(landmark, "weight"));
+    }
+    fputs(" |", out);
+    cJSON_ArrayForEach(residual, member(landmark, "residual_relative")) {
+      char text[32];
+      percent(cJSON_IsNumber(residual) ? residual->valuedouble : NAN, text);
+      fprintf(out, " %s%s", text, residual->next ? "," : "");
+    }
+    fputs(" |\n", out);
+  }
+}
+
 /* A section of the warnings, if there are any; collected first, to know that. */
 static void markdown_warnings(FILE *out, const cJSON *supermesh) {
   char *text = NULL;
@@ -308,7 +399,7 @@ static void markdown_warnings(FILE *out, const cJSON *supermesh) {
 
 static void markdown(FILE *out, const cJSON *supermesh) {
   char vertices[32], triangles[32], surface[64];
-  const cJSON *shape, *landmark, *certificate = member(supermesh, "certificate");
+  const cJSON *shape, *certificate = member(supermesh, "certificate");
   fputs("# Morph of ", out);
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
     markdown_text(out, cli_string(shape, "name", "?"));
@@ -328,29 +419,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   markdown_warnings(out, supermesh);
   markdown_shapes(out, supermesh);
   markdown_fits(out, supermesh);
-  if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
-    const char *exact = cJSON_IsTrue(member(certificate, "landmarks_exact"))
-                            ? were_guessed(supermesh)
-                                  ? "The landmarks coincide. They come from a match that orbmorph found."
-                                  : "All landmarks coincide exactly."
-                            : "The landmarks coincide only approximately.";
-    fprintf(out, "\n## Landmarks\n\n%s\n\n| landmark | distance on each shape |\n|---|---|\n",
-            were_found(supermesh)
-                ? "The request gave no landmarks; orbmorph found these. Check them before you rely on the result."
-                : exact);
-    cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
-      const cJSON *residual;
-      fputs("| ", out);
-      markdown_text(out, cli_string(landmark, "name", ""));
-      fputs(" |", out);
-      cJSON_ArrayForEach(residual, member(landmark, "residual_relative")) {
-        char text[32];
-        percent(residual->valuedouble, text);
-        fprintf(out, " %s%s", text, residual->next ? "," : "");
-      }
-      fputs(" |\n", out);
-    }
-  }
+  markdown_landmarks(out, supermesh);
   markdown_rims(out, supermesh);
   markdown_dropped(out, supermesh);
   fputs("\n## Time\n", out);

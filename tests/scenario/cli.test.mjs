@@ -517,6 +517,46 @@ test('a report warns of what is worse than asked, and only of that', async (t) =
   assert.match(await readFile(report, 'utf8'), /## Warnings\n\n(.*\n)*\* The morph differs .* \(tolerance 0\.1 %\)/);
 });
 
+test('only landmarks of weight 1 are called exact; of soft ones the client says how far they are off', async (t) => {
+  const d = await daemon(t);
+  const at = await folder(t);
+  const list = JSON.parse(await readFile(landmarks, 'utf8')).landmarks;
+  const limp = list.findIndex((l) => l.name === 'tail root');
+  const above = list.findIndex((l) => l.name === 'tail, above');
+  list[limp].at[1] = list[above].at[1]; // not its place, so that the map is better where it gives way
+  list.splice(above, 1);
+  const said = async (weightOf) => {
+    const marks = list.map((l, i) => ({ ...l, weight: weightOf(i) }));
+    await writeFile(path.join(at, 'marks.json'), JSON.stringify(marks));
+    const args = ['morph', dog, giraffe, '-l', 'marks.json', '-t', '0.02', '-o', 'x.glb'];
+    const env = { ORBMORPH_SERVER: d.url };
+    const done = await run([...args, '--report', 'r.md'], { env, cwd: at });
+    assert.equal(done.code, 0, done.err);
+    const json = await run([...args, '--json', '-q'], { env, cwd: at });
+    const report = await readFile(path.join(at, 'r.md'), 'utf8');
+    return { out: done.out, report, supermesh: JSON.parse(json.out) };
+  };
+  const off = (text) => Number(text.match(/up to ([\d.]+) % of the diagonal from/)[1]) / 100;
+  const near = (x, y) => assert.ok(Math.abs(x - y) <= 0.01 * y, `${x} ${y}`);
+
+  const one = await said((i) => (list[i].name === 'tail root' ? 0.3 : 1));
+  const soft = one.supermesh.landmarks.find((l) => l.name === 'tail root');
+  assert.equal(one.supermesh.certificate.landmarks_exact, true, 'the others are');
+  assert.match(one.out, /^ {2}19 landmarks, exact \(distance at most \S+ %\); 1 soft landmark, up to .* its place$/m);
+  assert.match(one.report, /^19 landmarks coincide exactly\. 1 soft landmark stays up to .* from its place\.$/m);
+  assert.match(one.report, /^\| tail root \(weight 0\.3\) \| /m);
+  for (const text of [one.out, one.report]) near(off(text), Math.max(...soft.residual_relative));
+
+  const two = await said((i) => (/^(tail root|belly)$/.test(list[i].name) ? 0.2 : 1));
+  assert.match(two.out, /^ {2}18 landmarks, exact \(.*\); 2 soft landmarks, up to .* from their places$/m);
+  assert.match(two.report, /^18 landmarks coincide exactly\. 2 soft landmarks stay up to .* from their places\.$/m);
+
+  const all = await said(() => 0.9);
+  assert.match(all.out, /^ {2}20 soft landmarks, .* their places$/m);
+  assert.match(all.report, /^20 soft landmarks stay .* their places\.$/m);
+  for (const text of [all.out, all.report]) assert.doesNotMatch(text, /exact/);
+});
+
 test('a report in Markdown says how the fit moved a shape, and takes any name and ending', async (t) => {
   const d = await daemon(t);
   const at = await folder(t);

@@ -243,3 +243,35 @@ test('a landmark that may be misplaced moves to where it would lie, and back', a
   );
   await done();
 });
+
+test('only landmarks of weight 1 are called exact', async () => {
+  const { landmarks: given } = JSON.parse(await readFile(sample('dog-giraffe.json'), 'utf8'));
+  const meshes = [];
+  for (const name of ['dog.obj', 'giraffe.off']) {
+    const body = await readFile(sample(name));
+    meshes.push(await (await fetch(`${daemon.url}/v1/meshes?name=${name}`, { method: 'POST', body })).json());
+  }
+  const soft = given.map((l, i) => (i === 0 ? { ...l, weight: 0.3 } : l));
+  for (const [marks, words] of [
+    [given, /^21, exact$/],
+    [soft, /^20 exact, 1 soft, up to [\d.e-]+ % from its place$/],
+  ]) {
+    const answer = await fetch(`${daemon.url}/v1/supermeshes`, {
+      method: 'POST',
+      headers: { 'content-type': 'application/json', prefer: 'wait=60' },
+      body: JSON.stringify({
+        shapes: meshes.map(({ id }) => ({ mesh: id })),
+        landmarks: marks,
+        remesh: { tolerance: 0.02 },
+      }),
+    });
+    const { id } = await answer.json();
+    const { page, done } = await openPage(browser, daemon.url, {
+      hash: `#m=${meshes.map((m) => m.id)}&tab=morph&r=${id}`,
+    });
+    const row = page.getByRole('row', { name: /^Landmarks/ }).getByRole('cell');
+    await until(() => row.count(), 'the report is shown');
+    assert.match(await row.textContent(), words);
+    await done();
+  }
+});

@@ -491,7 +491,7 @@ export type Supermesh = {
     flipped: number[];
     /** For the aligned sphere of each shape. */
     degree: number[];
-    /** True if each landmark is one vertex, at its place on every shape. */
+    /** True if each landmark of the request whose `weight` is 1 is one vertex of the supermesh, at its place on every shape. It is about no other landmark: not about soft ones, whose `weight` is below 1, and not about found ones. So it is true as well if the request gives no landmark of weight 1. `residual_relative` says how far each landmark is off. */
     landmarks_exact: boolean;
     /** For the supermesh on the sphere. */
     supermesh: {

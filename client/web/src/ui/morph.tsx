@@ -181,6 +181,22 @@ function wereGiven({ supermesh }: Result) {
   return Array.isArray(given) && given.every((landmark) => landmark.confidence === 1);
 }
 
+/** Distances below this are rounding, relative to the diagonal. */
+const ROUNDING = 1e-12;
+
+/** "20 exact, 1 soft, up to 4.7 % from its place": exact are only those that were set and have a weight of 1. */
+function landmarksIn(result: Result): string {
+  const { landmarks = [], certificate } = result.supermesh;
+  const soft = landmarks.filter((landmark) => 'weight' in landmark);
+  const firm = landmarks.length - soft.length;
+  const exact = firm > 0 && certificate?.landmarks_exact && wereGiven(result);
+  if (!soft.length) return `${firm}${exact ? ', exact' : ''}`;
+  const worst = Math.max(...soft.flatMap((landmark) => landmark.residual_relative.map((x) => x ?? 0)));
+  const place = soft.length > 1 ? 'their places' : 'its place';
+  const before = firm ? `${firm}${exact ? ' exact' : ''}, ` : '';
+  return `${before}${soft.length} soft, ${worst > ROUNDING ? `up to ${relative(worst)} from` : 'at'} ${place}`;
+}
+
 function Download({ result }: { result: Result }) {
   const { supermesh } = result;
   if (isWaiting())
@@ -219,7 +235,6 @@ export function MorphInspector() {
       </>
     );
   const { supermesh } = result;
-  const exact = supermesh.certificate?.landmarks_exact && wereGiven(result);
   return (
     <>
       <h2>Morph</h2>
@@ -291,10 +306,7 @@ export function MorphInspector() {
           {!!supermesh.landmarks?.length && (
             <tr>
               <th scope="row">Landmarks</th>
-              <td>
-                {supermesh.landmarks.length}
-                {exact ? ', exact' : ''}
-              </td>
+              <td>{landmarksIn(result)}</td>
             </tr>
           )}
           <tr>
