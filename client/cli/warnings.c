@@ -109,14 +109,38 @@ static int warn_of_suspects(FILE *out, const char *bullet, const cJSON *supermes
   return count;
 }
 
+/* The first part of which a left and a right one were found, such as "front limb"; NULL if there is none. */
+static const char *paired_part(const cJSON *supermesh) {
+  static const char left[] = "left ", right[] = "right ";
+  const cJSON *one, *other;
+  cJSON_ArrayForEach(one, member(supermesh, "landmarks")) {
+    const char *name = cli_string(one, "name", "");
+    if (strncmp(name, left, strlen(left)) != 0) {
+      continue;
+    }
+    const char *part = name + strlen(left);
+    cJSON_ArrayForEach(other, member(supermesh, "landmarks")) {
+      const char *twin = cli_string(other, "name", "");
+      if (strncmp(twin, right, strlen(right)) == 0 && strcmp(twin + strlen(right), part) == 0) {
+        return part;
+      }
+    }
+  }
+  return NULL;
+}
+
 static int warn_of_match(FILE *out, const char *bullet, const cJSON *supermesh) {
   const cJSON *match = member(supermesh, "match");
   int others = cJSON_GetArraySize(member(supermesh, "alternatives"));
   if (strcmp(cli_string(match, "verdict", ""), "unsure") != 0) { /* also where there is none: landmarks were given */
     return 0;
   }
-  fprintf(out, "%sNot sure: the shapes may be matched wrongly, such as a left leg with a right one (confidence %.2f). ",
-          bullet, cli_number(match, "confidence"));
+  const char *part = paired_part(supermesh);
+  fprintf(out, "%sNot sure: the shapes may be matched wrongly", bullet);
+  if (part) {
+    fprintf(out, ", such as a left %s with a right one", part);
+  }
+  fprintf(out, " (confidence %.2f). ", cli_number(match, "confidence"));
   if (others > 1) {
     fprintf(out, "Set landmarks, or send one of the %d requests in `alternatives`.\n", others);
   } else {
