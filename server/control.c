@@ -105,7 +105,7 @@ void control_serve(int fd, control_handler handle, void *user) {
   setsockopt(peer, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
   if (getsockopt(peer, SOL_SOCKET, SO_PEERCRED, &who, &size) == 0 && (who.uid == geteuid() || who.uid == 0)) {
     read_line(peer, line);
-    status = (char)('0' + handle(user, line, &reply));
+    status = (char)('0' + handle(user, line, who.uid, &reply));
     if (write_all(peer, &status, 1) && !reply.failed && reply.size) {
       write_all(peer, reply.data, reply.size);
     }

@@ -5,9 +5,12 @@
 #ifndef ORB_CONTROL_H
 #define ORB_CONTROL_H
 
+#include <sys/types.h>
+
 #include "api/text.h"
 
-typedef int (*control_handler)(void *user, const char *line, api_text *reply); /* returns the exit status */
+/* who: the user of the client's process, which the kernel tells. Returns the exit status. */
+typedef int (*control_handler)(void *user, const char *line, uid_t who, api_text *reply);
 
 /* The caller holds the lock of the data folder. Returns the descriptor, or −1 with the reason logged. */
 int control_listen(const char *data);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "admin/kinds.h"
+#include "audit.h"
 #include "backup.h"
 #include "control.h"
 #include "folder_lock.h"
@@ -112,9 +113,9 @@ static void on_change(const char *name, int taken) {
 }
 
 /* Executes a command from the control socket. */
-static int on_command(void *user, const char *line, api_text *reply) {
+static int on_command(void *user, const char *line, uid_t who, api_text *reply) {
   server *srv = user;
-  char what[8] = "", verb[8] = "", subject[ADMIN_WORD];
+  char what[8] = "", verb[8] = "", told[ADMIN_TOLD];
   sscanf(line, "%7s %7s", what, verb);
   const admin_kind *kind = admin_kind_named(admin_kinds, what);
   const int lists = strcmp(verb, "list") == 0, shows = strcmp(verb, "secret") == 0;
@@ -129,9 +130,8 @@ static int on_command(void *user, const char *line, api_text *reply) {
   if (status == 0 && !lists && !shows) {
     status = !parts_reload_callers(srv);
   }
-  if (!lists) {
-    admin_subject(kind, line, subject);
-    log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s%s", kind->name, verb, subject, status ? ", failed" : "");
+  if (admin_tell(kind, line, status, told)) {
+    audit_log(who, told);
   }
   return status;
 }
@@ -228,6 +228,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
     if (srv->at.fd >= 0 && srv->needs_token && callers_count(srv->callers) == 0) {
       log_warn("tokens are needed but none exist: create one with orbmorphd token add");
     }
+    audit_bring(srv->options->data);
     srv->control = control_listen(srv->options->data);
     announce(srv);
     pthread_sigmask(SIG_UNBLOCK, set, NULL); /* only in this thread */

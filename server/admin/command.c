@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "audit.h"
 #include "control.h"
 #include "store/place.h"
 
@@ -131,7 +132,7 @@ static void write_line(const admin_command *command, char line[ADMIN_LINE], char
   sodium_memzero(secret, sizeof secret);
 }
 
-enum { LINE_NAME = 2, LINE_FLAGS }; /* words of a line, from 0 on */
+enum { LINE_VERB = 1, LINE_NAME, LINE_FLAGS }; /* words of a line, from 0 on */
 
 static void word_of(const char *line, int n, char out[ADMIN_WORD]) {
   line += strspn(line, " ");
@@ -142,7 +143,8 @@ static void word_of(const char *line, int n, char out[ADMIN_WORD]) {
   snprintf(out, ADMIN_WORD, "%.*s", (int)strcspn(line, " "), line);
 }
 
-void admin_subject(const admin_kind *kind, const char *line, char out[ADMIN_WORD]) {
+/* "-" if the line has neither a NAME nor the word of the kind's `holder`. */
+static void subject_of(const admin_kind *kind, const char *line, char out[ADMIN_WORD]) {
   word_of(line, LINE_NAME, out);
   for (int i = 0; strcmp(out, "-") == 0 && kind->holder && i < ADMIN_FLAGS && kind->flags[i].name; i++) {
     if (strcmp(kind->flags[i].name, kind->holder) == 0) {
@@ -150,6 +152,14 @@ void admin_subject(const admin_kind *kind, const char *line, char out[ADMIN_WORD
       return;
     }
   }
+}
+
+int admin_tell(const admin_kind *kind, const char *line, int status, char out[ADMIN_TOLD]) {
+  char verb[ADMIN_WORD], subject[ADMIN_WORD];
+  word_of(line, LINE_VERB, verb);
+  subject_of(kind, line, subject);
+  snprintf(out, ADMIN_TOLD, "%s %.7s: %s%s", kind->name, verb, subject, status ? ", failed" : "");
+  return strcmp(verb, "list") != 0;
 }
 
 static int show(const admin_command *command, int status, const api_text *reply, const char *shown) {
@@ -178,18 +188,34 @@ int admin_command_ask(const admin_command *command, const config *options) {
   return status;
 }
 
+/* Executes a line on the catalogue. */
+static int apply(const admin_command *command, const char *data, const char *line, const char *shown, catalogue *cat) {
+  char told[ADMIN_TOLD];
+  api_text reply = {0};
+  const int is_told = admin_tell(command->kind, line, 0, told);
+  const int file = is_told ? audit_open(data) : -1;
+  if (is_told && file < 0) {
+    return 1;
+  }
+  int status = show(command, command->kind->apply(cat, line, &reply), &reply, shown);
+  if (is_told) {
+    admin_tell(command->kind, line, status, told);
+    status = audit_keep(file, told) ? status : 1;
+  }
+  api_text_free(&reply);
+  return status;
+}
+
 int admin_command_run(const admin_command *command, const config *options) {
   char line[ADMIN_LINE], shown[ADMIN_WORD];
   catalogue *cat = NULL;
-  api_text reply = {0};
   store_result opened =
       catalogue_open_among(options->data, config_catalogue(options), strcmp(options->objects, "files") != 0, &cat);
   if (opened != STORE_OK) {
     return opened == STORE_UNFIT ? CONFIG_UNFIT : 1;
   }
   write_line(command, line, shown);
-  int status = show(command, command->kind->apply(cat, line, &reply), &reply, shown);
-  api_text_free(&reply);
+  int status = apply(command, options->data, line, shown, cat);
   catalogue_close(cat);
   return status;
 }

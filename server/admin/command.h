@@ -2,7 +2,7 @@
  *
  * A command is one line of text: kind, verb, name, then a word for each row of the kind's table of flags. The process
  * that holds the data folder executes it: a running daemon, through its control socket, or else this process. A running
- * daemon applies the change from the next request on.
+ * daemon applies the change from the next request on. Either way the audit log names the command (audit.h).
  *
  * A kind is a table and the function that executes its lines. A new one is a file such as key.c, declared in kinds.h,
  * with a row in `admin_kinds` of main.c.
@@ -14,7 +14,7 @@
 #include "config.h"
 #include "store/catalogue.h"
 
-enum { ADMIN_WORD = 512, ADMIN_FLAGS = 9, ADMIN_VERBS = 6, ADMIN_SECRET = 96 };
+enum { ADMIN_WORD = 512, ADMIN_FLAGS = 9, ADMIN_VERBS = 6, ADMIN_SECRET = 96, ADMIN_TOLD = 600 };
 
 /* The verbs of a kind; in admin_flag, bit n stands for the verb in row n. */
 typedef struct admin_verb {
@@ -66,8 +66,9 @@ int admin_command_ask(const admin_command *command, const config *options);
 /* Executes the command in this process, which holds the lock of the data folder. Returns the exit status. */
 int admin_command_run(const admin_command *command, const config *options);
 
-/* What a line is about, for the log: its NAME, or the word of the kind's `holder`; "-" if it has neither. */
-void admin_subject(const admin_kind *kind, const char *line, char out[ADMIN_WORD]);
+/* What the audit log says of a line: kind, verb, and what it is about, which is its NAME or the word of the kind's
+ * `holder`, or "-" if it has neither: "token add: shop, failed". 0: it says nothing of lists. */
+int admin_tell(const admin_kind *kind, const char *line, int status, char out[ADMIN_TOLD]);
 
 /* For admin_flag.read. A name has 1 to 63 letters, digits, '-', '_' and '.', and does not begin with '-'. */
 int admin_read_name(const char *value, char word[ADMIN_WORD]);

@@ -1,7 +1,8 @@
 // Tokens: the command that creates them, and what each scope may do.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
-import { readFile, readdir } from 'node:fs/promises';
+import { link, mkdir, readFile, readdir, rm, stat, symlink, writeFile } from 'node:fs/promises';
+import { userInfo } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
@@ -231,4 +232,65 @@ test('a token is valid until it expires, and the audit log names who was refused
   has({ audit: 'admin-read', token: 'root', route: '/readyz', address });
   assert.ok(!lines.some(({ token, audit }) => token === 'soon' && audit !== 'refused'), 'ordinary reads are not in it');
   for (const secret of [soon, day, past, root]) assert.ok(!d.log.includes(secret));
+});
+
+test('the audit log names who gave a command, also where no daemon ran', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on'] });
+  const pending = path.join(d.data, 'audit.pending');
+  const webhook = (...words) => promisify(execFile)(binaries.daemon, ['webhook', ...words, '--data', d.data]);
+  await run(d, 'add', 'live', '--scope', 'read');
+  await d.stop();
+  const before = Date.now();
+  const { stdout: token } = await run(d, 'add', 'late', '--scope', 'read');
+  await assert.rejects(run(d, 'set', 'nobody', '--expires', 'never'), { code: 1 });
+  await run(d, 'list');
+  const { stdout: secret } = await webhook('secret', '--tenant', 'shop');
+  const after = Date.now();
+  assert.equal((await stat(pending)).mode & 0o777, 0o600);
+  const kept = await readFile(pending, 'utf8');
+
+  // A command that could leave no record is not executed, nor one that would write to another file.
+  const other = path.join(d.data, 'other');
+  await writeFile(other, '');
+  for (const put of [mkdir, (at) => symlink(other, at), (at) => link(other, at)]) {
+    await rm(pending, { recursive: true });
+    await put(pending);
+    await assert.rejects(run(d, 'add', 'unseen', '--scope', 'admin'), ({ code, stdout, stderr }) => {
+      return code === 1 && stdout === '' && /nothing was done: .*audit\.pending/.test(stderr);
+    });
+  }
+  await rm(pending);
+  assert.equal(await readFile(other, 'utf8'), '');
+  await rm(other);
+  assert.doesNotMatch((await run(d, 'list')).stdout, /unseen/);
+
+  await writeFile(pending, `${kept}{"made":"20\n`); // half a line hides no other
+  const start = d.log.length;
+  await d.start();
+  await assert.rejects(stat(pending), { code: 'ENOENT' });
+  await d.stop();
+  await d.start();
+  await run(d, 'remove', 'late');
+  await d.stop();
+  const lines = d.log
+    .split('\n')
+    .filter((line) => line.includes('"audit":"command"'))
+    .map((line) => JSON.parse(line));
+  const { uid, username } = userInfo();
+  const names = lines.map(({ message, without_daemon: alone }) => [message, alone]);
+  assert.deepEqual(names, [
+    ['token add: live', undefined],
+    ['token add: late', true],
+    ['token set: nobody, failed', true],
+    ['webhook secret: shop', true],
+    ['token remove: late', undefined],
+  ]);
+  for (const line of lines) {
+    assert.deepEqual([line.level, line.uid, line.user], ['info', uid, username]);
+    if (!line.without_daemon) continue;
+    const made = Date.parse(line.made);
+    assert.ok(before <= made && made <= after && made < Date.parse(line.time), JSON.stringify(line));
+  }
+  assert.match(d.log.slice(start), /audit\.pending has 1 line/);
+  for (const text of [token, secret]) assert.ok(!`${kept}${d.log}`.includes(text.trim()));
 });

@@ -28,7 +28,7 @@ ORDER = [
     "core/remesh/common", "core/remesh/overlay", "core/remesh/placed", "core/remesh/adaptive", "core/remesh",
     "core/transfer", "core/carry", "core/profile", "core/merge", "api",
     "server/log", "server/trim", "server/hash", "server/faults", "server/wake", "server/budget", "server/temporary", "server/tasks", "server/metrics", "server/pages", "server/studio",
-    "server/trace", "server/net", "server/config_values", "server/config", "server/control", "server/systemd", "server/store", "server/isolate", "server/intake", "server/convert", "server/deliver", "server/cache", "server/queue", "server/worker",
+    "server/trace", "server/net", "server/config_values", "server/config", "server/audit", "server/control", "server/systemd", "server/store", "server/isolate", "server/intake", "server/convert", "server/deliver", "server/cache", "server/queue", "server/worker",
     "server/evict", "server/scrub", "server/maintain", "server/folder_lock", "server/backup", "server/migrate", "server/admin", "server/http", "server/housekeeping", "server/parts", "server/main",
     "client/cli", "client/js/src", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme", "client/web/src/focus",
     "client/web/src/take", "client/web/src/welcome", "client/web/src/state", "client/web/src/player",
