@@ -46,7 +46,11 @@ static int read_index(const cJSON *value, int32_t *out) {
   return 1;
 }
 
-/* The sum of barycentric coordinates may differ from 1 by 1e-6; they are stored scaled to a sum of 1. */
+/* The sum of scaled coordinates differs from 1 by this at most: rounding of three quotients and two sums. */
+static const double ROUNDING = 1e-15;
+
+/* The sum of barycentric coordinates may differ from 1 by 1e-6; they are stored scaled to a sum of 1. Those that are
+ * scaled already stay as they are: a request that is read back keeps its id. */
 static const char *read_barycentric(const cJSON *value, double out[3]) {
   if (!read_triple(value, out)) {
     return "\"barycentric\" must be three numbers";
@@ -55,7 +59,7 @@ static const char *read_barycentric(const cJSON *value, double out[3]) {
   if (out[0] < 0 || out[1] < 0 || out[2] < 0 || !(fabs(sum - 1) <= 1e-6)) {
     return "barycentric coordinates must not be negative and must add up to 1";
   }
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 3 && fabs(sum - 1) > ROUNDING; k++) {
     out[k] /= sum;
   }
   return NULL;

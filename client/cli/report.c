@@ -366,9 +366,12 @@ static void markdown_landmarks(FILE *out, const cJSON *supermesh) {
   if (!cJSON_GetArraySize(member(supermesh, "landmarks"))) {
     return;
   }
+  const int shares = member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "share") != NULL;
   fputs("\n## Landmarks\n\n", out);
   markdown_meeting(out, supermesh);
-  fputs("\n\n| landmark | distance on each shape |\n|---|---|\n", out);
+  fputs(shares ? "\n\n| landmark | distance on each shape | share of the distortion around it |\n|---|---|---|\n"
+               : "\n\n| landmark | distance on each shape |\n|---|---|\n",
+        out);
   cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
     fputs("| ", out);
     markdown_text(out, cli_string(landmark, "name", ""));
@@ -380,6 +383,9 @@ static void markdown_landmarks(FILE *out, const cJSON *supermesh) {
       char text[32];
       percent(cJSON_IsNumber(residual) ? residual->valuedouble : NAN, text);
       fprintf(out, " %s%s", text, residual->next ? "," : "");
+    }
+    if (shares) {
+      fprintf(out, " | %.0f %%", 100 * cli_number(landmark, "share"));
     }
     fputs(" |\n", out);
   }
