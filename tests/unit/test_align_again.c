@@ -61,6 +61,21 @@ static void scene_close(scene *s) {
   orb_context_destroy(s->ctx);
 }
 
+/* What most tests begin with, made once. Each has its own landmarks. */
+static scene shared;
+
+static int open_shared(void **unused) {
+  (void)unused;
+  scene_open(&shared, 1);
+  return 0;
+}
+
+static int close_shared(void **unused) {
+  (void)unused;
+  scene_close(&shared);
+  return 0;
+}
+
 /* Moves a landmark of the second creature to a place beside its own, inside a triangle. */
 static void nudge(scene *s, int landmark) {
   s->at[landmark][1].at[0] = 0.8;
@@ -68,8 +83,15 @@ static void nudge(scene *s, int landmark) {
   s->at[landmark][1].at[2] = 0.08;
 }
 
+static orb_status align_again(scene *s, const orb_alignment *start, orb_alignment *out) {
+  for (int i = 0; i < LIMBS; i++) {
+    s->landmark[i].at = s->at[i]; /* of this copy of a scene */
+  }
+  return orb_align_again(s->ctx, s->shape, SHAPES, s->landmark, LIMBS, &s->options, start, out);
+}
+
 static void again(scene *s, const orb_alignment *start, int followed, orb_alignment *out) {
-  assert_int_equal(orb_align_again(s->ctx, s->shape, SHAPES, s->landmark, LIMBS, &s->options, start, out), ORB_OK);
+  assert_int_equal(align_again(s, start, out), ORB_OK);
   assert_int_equal(out->has_followed, followed);
   check_alignment(out, 1);
 }
@@ -105,10 +127,9 @@ static void corrected_landmarks_meet(void **unused) {
 
 /* The second correction begins at the first one, whose meshes have been split; each triangle still has its parent. */
 static void corrections_follow_each_other(void **unused) {
-  scene s;
+  scene s = shared;
   orb_alignment one, two;
   (void)unused;
-  scene_open(&s, 1);
   nudge(&s, 1);
   again(&s, &s.start, 1, &one);
   assert_true(one.shapes[1].mesh.vertex_count > s.mesh[1].vertex_count);
@@ -149,15 +170,13 @@ static void corrections_follow_each_other(void **unused) {
   }
   orb_alignment_free(s.ctx, &one);
   orb_alignment_free(s.ctx, &two);
-  scene_close(&s);
 }
 
 /* Landmarks that take limbs to other limbs lead away from the start: the shapes are aligned anew, and they meet. */
 static void other_limbs_begin_anew(void **unused) {
-  scene s;
+  scene s = shared;
   orb_alignment out;
   (void)unused;
-  scene_open(&s, 1);
   for (int i = 0; i < LIMBS; i++) { /* an odd permutation: a mirror image */
     static const int other[LIMBS] = {1, 0, 2, 3};
     assert_int_equal(orb_place_of_vertex(s.ctx, &s.mesh[1], shape_farthest(&s.mesh[1], limb[other[i]]), &s.at[i][1]),
@@ -165,25 +184,22 @@ static void other_limbs_begin_anew(void **unused) {
   }
   again(&s, &s.start, 0, &out);
   orb_alignment_free(s.ctx, &out);
-  scene_close(&s);
 }
 
 /* A soft landmark is no vertex that both shapes share. */
 static void soft_landmarks_stay_soft(void **unused) {
-  scene s;
+  scene s = shared;
   orb_alignment out;
   (void)unused;
-  scene_open(&s, 1);
   nudge(&s, 0);
   s.landmark[0].weight = 0.3;
-  assert_int_equal(orb_align_again(s.ctx, s.shape, SHAPES, s.landmark, LIMBS, &s.options, &s.start, &out), ORB_OK);
+  assert_int_equal(align_again(&s, &s.start, &out), ORB_OK);
   assert_int_equal(out.has_followed, 1);
   for (int k = 0; k < SHAPES; k++) {
     assert_int_equal(out.shapes[k].landmark_vertices[0], -1);
     assert_true(out.shapes[k].landmark_vertices[1] >= 0);
   }
   orb_alignment_free(s.ctx, &out);
-  scene_close(&s);
 }
 
 static void assert_refused(scene *s, const orb_align_shape *shapes, int32_t landmarks, const char *word) {
@@ -196,16 +212,14 @@ static void assert_refused(scene *s, const orb_align_shape *shapes, int32_t land
 }
 
 static void other_starts_are_refused(void **unused) {
-  scene s;
+  scene s = shared;
   (void)unused;
-  scene_open(&s, 1);
   const orb_align_shape swapped[SHAPES] = {s.shape[1], s.shape[0]};
   assert_refused(&s, swapped, LIMBS, "of other shapes");
   s.options.method = ORB_ALIGN_AUTO;
   assert_refused(&s, s.shape, 0, "with landmarks");
   s.options.method = ORB_ALIGN_RBF;
   assert_refused(&s, s.shape, LIMBS, "pin and auto");
-  scene_close(&s);
 }
 
 int main(void) {
@@ -213,5 +227,5 @@ int main(void) {
       cmocka_unit_test(corrected_landmarks_meet), cmocka_unit_test(corrections_follow_each_other),
       cmocka_unit_test(other_limbs_begin_anew), cmocka_unit_test(soft_landmarks_stay_soft),
       cmocka_unit_test(other_starts_are_refused)};
-  return cmocka_run_group_tests(tests, NULL, NULL);
+  return cmocka_run_group_tests(tests, open_shared, close_shared);
 }
