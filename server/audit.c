@@ -136,6 +136,9 @@ void audit_bring(const char *data) {
   char path[PATH_MAX], *text = NULL;
   size_t room = 0;
   int bad = 0;
+  if (!log_wants(LOG_INFO)) { /* they wait for a daemon that logs them */
+    return;
+  }
   path_of(data, path);
   FILE *in = fopen(path, "re");
   if (!in) {
@@ -151,7 +154,11 @@ void audit_bring(const char *data) {
     log_warn("the audit log may lack commands that were given without the daemon: %s has %d line%s that cannot be read",
              path, bad, bad == 1 ? "" : "s");
   }
+  const int is_read = !ferror(in);
   free(text);
   fclose(in);
-  unlink(path);
+  if (is_read && unlink(path) != 0) {
+    log_warn("the audit log will have commands that were given without the daemon twice: %s: %s", path,
+             strerror(errno));
+  }
 }

@@ -349,9 +349,10 @@ static void markdown_meeting(FILE *out, const cJSON *supermesh) {
     } else {
       fputs(is_met && !were_guessed(supermesh) ? "All landmarks" : "The landmarks", out);
     }
-    fputs(!is_met                   ? " coincide only approximately."
-          : were_guessed(supermesh) ? " coincide. They come from a match that orbmorph found."
-                                    : " coincide exactly.",
+    fputs(!is_met                         ? " coincide only approximately."
+          : were_guessed(supermesh)       ? " coincide. They come from a match that orbmorph found."
+          : firm.count == 1 && soft.count ? " coincides exactly."
+                                          : " coincide exactly.",
           out);
   }
   if (soft.count) {

@@ -2,7 +2,8 @@
  * the given mesh keep their numbers, positions and sources, and most triangles are the same.
  *
  *   char[8] "ORBALIGN", uint32 version, uint32 0x01020304 (byte order)
- *   int32 shapes, landmarks, found, followed; double energy
+ *   int32 shapes, landmarks, found, followed; double energy; for each shape uint64[2] digests of the given positions
+ *     and triangles
  *   int32 1, int32 part and double bend, clear, lead, confidence of the match, or 0
  *   int32 alternatives; for each double cost, int32 shape, int32 count, count × shapes places (int32 triangle,
  *     double[3])
@@ -22,6 +23,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/hash.h"
 #include "base/memory.h"
 
 enum { VERSION = 8, BYTE_ORDER_MARK = 0x01020304 };
@@ -31,6 +33,13 @@ static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 152, "write and read the new member");
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
                "write and read the new member");
+
+/* Tells meshes apart that have the same connectivity, such as one body in two poses. */
+static void digest_of(const orb_mesh *mesh, uint64_t digest[2]) {
+  static const uint64_t key[2] = {0x6f72626d6f727068, 0x616c69676e6d656e};
+  digest[0] = orb_siphash13(key, mesh->positions, 3 * (size_t)mesh->vertex_count * sizeof *mesh->positions);
+  digest[1] = orb_siphash13(key, mesh->triangles, 3 * (size_t)mesh->triangle_count * sizeof *mesh->triangles);
+}
 
 /* One array of a mesh with a fixed number of bytes per triangle. */
 typedef struct column {
@@ -221,6 +230,11 @@ orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, 
   put_integer(&w, alignment->found_count);
   put_integer(&w, alignment->has_followed);
   put(&w, &alignment->energy, sizeof alignment->energy);
+  for (int32_t s = 0; s < alignment->shape_count; s++) {
+    uint64_t digest[2];
+    digest_of(shapes[s].mesh, digest);
+    put(&w, digest, sizeof digest);
+  }
   put_match(&w, alignment);
   put_suspects(&w, alignment);
   put_shares(&w, alignment);
@@ -498,6 +512,12 @@ static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *s
     return ORB_E_NO_MEMORY;
   }
   out->shape_count = shape_count;
+  for (int32_t s = 0; s < shape_count; s++) {
+    uint64_t digest[2], kept[2];
+    digest_of(shapes[s].mesh, digest);
+    take(r, kept, sizeof kept);
+    r->bad |= memcmp(digest, kept, sizeof kept) != 0;
+  }
   out->landmark_count = landmarks;
   out->found_count = found;
   ORB_TRY(take_match(ctx, r, shapes, out));

@@ -27,7 +27,7 @@ int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const
   if (fine && cat) {
     catalogue_touch(cat, RESOURCE_ALIGNMENT, id);
   } else if (!fine) {
-    log_warn("the kept alignment %s cannot be used; it is computed again", id);
+    log_warn("the kept alignment %s cannot be used", id);
   }
   free(bytes);
   return fine;

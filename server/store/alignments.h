@@ -1,7 +1,7 @@
 /* Kept alignments: an object (the bytes of orb_alignment_write()) and a row with its hash, named by all that the
  * alignment depends on (api_alignment_id()). A request that differs from an earlier one only in remeshing or in the
- * asset reuses its alignment. Nothing depends on kept alignments: they are evicted like embeddings, and a damaged one
- * is computed again. */
+ * asset reuses its alignment; one that is gone or damaged is computed again. A request may also name one to begin with
+ * ("align.start"), and fails if that is gone. They are evicted like embeddings. */
 #ifndef ORB_STORE_ALIGNMENTS_H
 #define ORB_STORE_ALIGNMENTS_H
 

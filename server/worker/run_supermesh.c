@@ -274,8 +274,8 @@ static int store_result_of(const run_env *env, orb_context *ctx, const run_job *
   return 1;
 }
 
-/* Aligns again, from the alignment that the request names. It never aligns anew instead, since the same request gives
- * the same result. */
+/* Aligns again, from the alignment that the request names. If that is gone, the job fails: the same request gives the
+ * same result, whatever is kept. */
 static int align_again(const run_env *env, orb_context *ctx, const merge_input *in, orb_alignment *out,
                        api_problem *problem) {
   const api_supermesh_request *request = &in->request;
@@ -284,6 +284,10 @@ static int align_again(const run_env *env, orb_context *ctx, const merge_input *
   const int kept = run_get(env, RESOURCE_ALIGNMENT, request->start, &row) == STORE_OK &&
                    alignments_get(env->cat, env->store, ctx, &row, in->shapes, request->shape_count, &start);
   resource_free(&row);
+  const orb_status why = orb_context_error(ctx)->status;
+  if (!kept && why != ORB_OK && why != ORB_E_BAD_OPTION) { /* no memory, or cancelled */
+    return 0;
+  }
   if (!kept) {
     api_refuse(
         problem, "bad-option",

@@ -211,6 +211,47 @@ static void assert_refused(scene *s, const orb_align_shape *shapes, int32_t land
   assert_memory_equal(&out, &none, sizeof none);
 }
 
+/* A third shape moves beside the second; both keep to the first. */
+static void three_shapes_follow(void **unused) {
+  scene s = shared;
+  const orb_align_shape shapes[3] = {s.shape[0], s.shape[1], s.shape[1]};
+  orb_place at[LIMBS][3];
+  orb_landmark landmarks[LIMBS];
+  orb_alignment start, out;
+  (void)unused;
+  for (int i = 0; i < LIMBS; i++) {
+    memcpy(at[i], s.at[i], sizeof s.at[i]);
+    at[i][2] = s.at[i][1];
+    landmarks[i] = s.landmark[i];
+    landmarks[i].at = at[i];
+  }
+  align_and_check(s.ctx, shapes, 3, landmarks, LIMBS, &s.options, &start);
+  nudge(&s, 3);
+  at[3][2] = s.at[3][1];
+  assert_int_equal(orb_align_again(s.ctx, shapes, 3, landmarks, LIMBS, &s.options, &start, &out), ORB_OK);
+  assert_int_equal(out.has_followed, 1);
+  check_alignment(&out, 1);
+  assert_int_equal(out.shapes[0].mesh.vertex_count, s.mesh[0].vertex_count);
+  assert_int_equal(out.shapes[1].mesh.vertex_count, s.mesh[1].vertex_count);
+  assert_int_equal(out.shapes[2].mesh.vertex_count, s.mesh[1].vertex_count + 1);
+  orb_alignment_free(s.ctx, &start);
+  orb_alignment_free(s.ctx, &out);
+}
+
+/* A landmark whose triangle does not exist is refused as by orb_align(), also where the start has split meshes. */
+static void places_that_do_not_exist_are_refused(void **unused) {
+  scene s = shared;
+  orb_alignment one, out;
+  (void)unused;
+  nudge(&s, 1);
+  again(&s, &s.start, 1, &one);
+  s.at[2][1].triangle = s.mesh[1].triangle_count;
+  assert_int_equal(align_again(&s, &one, &out), ORB_E_BAD_LANDMARKS);
+  s.at[2][1] = (orb_place){0, {1.5, -0.5, 0}};
+  assert_int_equal(align_again(&s, &one, &out), ORB_E_BAD_LANDMARKS);
+  orb_alignment_free(s.ctx, &one);
+}
+
 static void other_starts_are_refused(void **unused) {
   scene s = shared;
   (void)unused;
@@ -225,7 +266,8 @@ static void other_starts_are_refused(void **unused) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(corrected_landmarks_meet), cmocka_unit_test(corrections_follow_each_other),
-      cmocka_unit_test(other_limbs_begin_anew), cmocka_unit_test(soft_landmarks_stay_soft),
+      cmocka_unit_test(other_limbs_begin_anew),   cmocka_unit_test(soft_landmarks_stay_soft),
+      cmocka_unit_test(three_shapes_follow),      cmocka_unit_test(places_that_do_not_exist_are_refused),
       cmocka_unit_test(other_starts_are_refused)};
   return cmocka_run_group_tests(tests, open_shared, close_shared);
 }

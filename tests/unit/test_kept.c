@@ -114,6 +114,8 @@ static void align(bodies *b, orb_align_method method, int landmarks, orb_alignme
 
 /* The preset fast measures none. */
 static void add_shares(bodies *b, orb_alignment *a) {
+  orb_free(b->ctx, a->landmark_shares);
+  a->landmark_shares = NULL;
   if (a->landmark_count > 0) {
     a->landmark_shares = ORB_NEW(b->ctx, double, a->landmark_count);
     assert_non_null(a->landmark_shares);
@@ -187,6 +189,9 @@ static void damage_is_refused(void **state) {
   assert_false(is_refused(&b, bytes.data, bytes.size, b.shape));
   assert_true(is_refused(&b, bytes.data, bytes.size, swapped));
   assert_true(is_refused(&b, bytes.data, bytes.size, other));
+  b.mesh[1].positions[4] += 1e-9; /* the same connectivity */
+  assert_true(is_refused(&b, bytes.data, bytes.size, b.shape));
+  b.mesh[1].positions[4] -= 1e-9;
   for (size_t size = 0; size < bytes.size; size += size < 200 ? 1 : bytes.size / 60) {
     assert_true(is_refused(&b, bytes.data, size, b.shape));
   }

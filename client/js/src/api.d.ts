@@ -431,7 +431,7 @@ export type Supermesh = {
     weight?: number;
     /** The distance from the place that the request gives, one for each shape. A soft landmark ends halfway between its places on the sphere. */
     residual_relative: Array<number | null>;
-    /** The share of the map's distortion that lies nearer to this landmark than to the others; with several later shapes, the largest. Absent where no suspects are looked for: the map is good, or the request has fewer than four landmarks. */
+    /** The share of the map's distortion that lies nearer to this landmark than to the others; with several later shapes, the largest. Absent where no suspects are looked for: the map is good or was not composed, one shape is a part of the other, or the request has fewer than four landmarks. */
     share?: number;
   } | {
     /** "auto" and its number, from 1. */

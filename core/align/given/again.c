@@ -10,61 +10,79 @@
 #include "align/sheet/landmarks.h"
 #include "align/sheet/sheet.h"
 #include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
-#include "numeric/vec3.h"
+#include "mesh/nearest.h"
 
-/* Coordinates of x in a triangle, as if it lay in its plane; returns the least, −INFINITY for one without area. */
-static double coordinates_in(const orb_mesh *mesh, int32_t triangle, const double x[3], double out[3]) {
-  const double *p[3];
-  double edge[2][3], away[3], n[3];
-  for (int k = 0; k < 3; k++) {
-    p[k] = mesh->positions + 3 * (size_t)mesh->triangles[3 * (size_t)triangle + (size_t)k];
-  }
-  orb_sub(p[1], p[0], edge[0]);
-  orb_sub(p[2], p[0], edge[1]);
-  orb_sub(x, p[0], away);
-  orb_cross(edge[0], edge[1], n);
-  const double squared = orb_dot(n, n);
-  if (!(squared > 0)) {
-    return -INFINITY;
-  }
-  double across[3];
-  orb_cross(away, edge[1], across);
-  out[1] = orb_dot(across, n) / squared;
-  orb_cross(edge[0], away, across);
-  out[2] = orb_dot(across, n) / squared;
-  out[0] = 1 - out[1] - out[2];
-  return fmin(out[0], fmin(out[1], out[2]));
+/* The triangles of an aligned mesh by the given triangle in which they lie. */
+typedef struct pieces {
+  int32_t *first, *next; /* of each given triangle, and of each aligned one; −1: none */
+} pieces;
+
+static void pieces_free(orb_context *ctx, pieces *p) {
+  orb_free(ctx, p->first);
+  orb_free(ctx, p->next);
 }
 
-/* The same place on the aligned mesh, whose triangles divide those of the given one. *found 0: its pieces are too thin
- * to tell. O(triangles), unless nothing is divided. */
-static void place_on_aligned(const orb_mesh *given, const orb_aligned_shape *shape, const orb_place *place,
-                             orb_place *out, int *found) {
-  double x[3], at[3], best = -INFINITY;
-  *out = *place;
-  *found = shape->mesh.vertex_count == given->vertex_count;
-  if (*found || place->triangle < 0 || place->triangle >= given->triangle_count) {
-    return;
+static orb_status pieces_create(orb_context *ctx, const orb_mesh *given, const orb_aligned_shape *shape, pieces *out) {
+  const int32_t count = shape->mesh.triangle_count;
+  out->first = ORB_NEW(ctx, int32_t, given->triangle_count);
+  out->next = ORB_NEW(ctx, int32_t, count);
+  if (!out->first || !out->next) {
+    return ORB_E_NO_MEMORY;
   }
+  memset(out->first, -1, (size_t)given->triangle_count * sizeof *out->first);
+  for (int32_t t = count - 1; t >= 0; t--) {
+    out->next[t] = out->first[shape->parent[t]];
+    out->first[shape->parent[t]] = t;
+  }
+  return ORB_OK;
+}
+
+/* Does the mesh have this place? orb_align() says what is wrong with one that it does not have. */
+static int has_place(const orb_mesh *given, const orb_place *place) {
+  return place->triangle >= 0 && place->triangle < given->triangle_count && place->at[0] >= 0 && place->at[1] >= 0 &&
+         place->at[2] >= 0;
+}
+
+/* The same place on the aligned mesh: in the nearest piece of its triangle, unless that is undivided. */
+static void place_on_aligned(const orb_mesh *given, const orb_aligned_shape *shape, const pieces *p,
+                             const orb_place *place, orb_place *out) {
+  const int32_t first = p->first[place->triangle];
+  double x[3], least = INFINITY;
   orb_place_position(given, place, x);
-  for (int32_t t = 0; t < shape->mesh.triangle_count; t++) {
-    const double least = shape->parent[t] == place->triangle ? coordinates_in(&shape->mesh, t, x, at) : -INFINITY;
-    if (least > best) {
-      best = least;
+  *out = *place;
+  for (int32_t t = p->next[first] < 0 && first == place->triangle ? -1 : first; t >= 0; t = p->next[t]) {
+    double corners[9], at[3];
+    for (int k = 0; k < 3; k++) {
+      const int32_t v = shape->mesh.triangles[3 * (size_t)t + (size_t)k];
+      memcpy(corners + 3 * k, shape->mesh.positions + 3 * (size_t)v, sizeof(double[3]));
+    }
+    const double distance = orb_triangle_nearest(corners, x, at);
+    if (distance < least) {
+      least = distance;
       out->triangle = t;
       memcpy(out->at, at, sizeof at);
     }
   }
-  *found = best > -INFINITY;
-  double sum = 0;
-  for (int k = 0; k < 3; k++) {
-    out->at[k] = fmax(0, out->at[k]);
-    sum += out->at[k];
+}
+
+/* Moves the landmarks of shape s to its aligned mesh. at: the place of landmark l is at[l * shape_count]. *fine 0: a
+ * landmark has no place on the given mesh. */
+static orb_status move_landmarks(orb_context *ctx, const orb_mesh *given, const orb_aligned_shape *shape, int32_t s,
+                                 const orb_landmark *landmarks, int32_t count, size_t shape_count, orb_place *at,
+                                 int *fine) {
+  pieces p = {0};
+  orb_status status = pieces_create(ctx, given, shape, &p);
+  for (int32_t l = 0; l < count && status == ORB_OK && *fine; l++) {
+    *fine = has_place(given, &landmarks[l].at[s]) && p.first[landmarks[l].at[s].triangle] >= 0;
+    if (*fine) {
+      place_on_aligned(given, shape, &p, &landmarks[l].at[s], &at[(size_t)l * shape_count]);
+    }
   }
-  for (int k = 0; k < 3 && *found; k++) {
-    out->at[k] /= sum;
-  }
+  status = status == ORB_OK ? orb_context_check(ctx) : status;
+  pieces_free(ctx, &p);
+  return status;
 }
 
 /* Shape s of the start with the landmarks, which are on its mesh, as vertices. Its triangles lie in those of the given
@@ -89,14 +107,16 @@ static orb_status open_shapes(orb_context *ctx, const orb_align_shape *shapes, c
   orb_landmark *moved = ORB_NEW(ctx, orb_landmark, count);
   orb_place *at = ORB_NEW(ctx, orb_place, (size_t)count * shape_count);
   orb_sheet *sheets = ORB_NEW0(ctx, orb_sheet, shape_count);
-  int32_t unique_count, *unique = ORB_NEW(ctx, int32_t, count);
+  int32_t *unique = ORB_NEW(ctx, int32_t, count), unique_count;
   orb_status status = moved && at && sheets && unique ? ORB_OK : ORB_E_NO_MEMORY;
   *fine = 1;
-  for (size_t i = 0; i < (size_t)count * shape_count && status == ORB_OK && *fine; i++) {
-    const size_t l = i / shape_count, s = i % shape_count;
+  for (int32_t l = 0; l < count && status == ORB_OK; l++) {
     moved[l] = landmarks[l];
-    moved[l].at = at + l * shape_count;
-    place_on_aligned(shapes[s].mesh, &start->shapes[s], &landmarks[l].at[s], &at[i], fine);
+    moved[l].at = at + (size_t)l * shape_count;
+  }
+  for (size_t s = 0; s < shape_count && status == ORB_OK && *fine; s++) {
+    status =
+        move_landmarks(ctx, shapes[s].mesh, &start->shapes[s], (int32_t)s, landmarks, count, shape_count, at + s, fine);
   }
   for (size_t s = 0; s < shape_count && status == ORB_OK && *fine; s++) {
     status = insert(ctx, &start->shapes[s], (int32_t)s, moved, count, &sheets[s]);
@@ -135,35 +155,54 @@ static orb_status follow_shape(orb_context *ctx, orb_aligned_shape *fixed, orb_a
   return ORB_OK;
 }
 
-/* Which of two shapes has moved: the energy is that of its triangles, so it is low. before: that energy. */
-static orb_status find_moving(orb_context *ctx, orb_alignment *a, orb_preset preset, int32_t *moving, double *before) {
+/* Exchanges the two shapes. */
+static void swap(orb_alignment *a) {
+  const orb_aligned_shape first = a->shapes[0];
+  a->shapes[0] = a->shapes[1];
+  a->shapes[1] = first;
+}
+
+/* Puts the shape that has moved second: the energy of a map is that of the triangles that move, so it is low. */
+static orb_status put_moved_second(orb_context *ctx, orb_alignment *a, orb_preset preset, int *swapped) {
   double energy[2];
-  for (int32_t s = 0; s < 2; s++) {
+  *swapped = 0;
+  for (int32_t s = 0; s < 2 && a->shape_count == 2; s++) {
     ORB_TRY(orb_compose_energy(ctx, &a->shapes[1 - s], &a->shapes[s], preset, &energy[s]));
   }
-  *moving = energy[0] < energy[1] ? 0 : 1;
-  *before = energy[*moving];
+  if (a->shape_count == 2 && energy[0] < energy[1]) {
+    swap(a);
+    *swapped = 1;
+  }
   return ORB_OK;
 }
 
-/* Follows the start to all later shapes. *followed 0: a map is lost, or has got much worse than the start. */
+/* Follows the start to all later shapes. *followed 0: a map is lost, or is bad, or has got much worse than the start.
+ */
 static orb_status follow_all(orb_context *ctx, orb_alignment *a, orb_preset preset, int *followed) {
   double sum = 0;
   for (int32_t s = 1; s < a->shape_count && *followed; s++) {
-    int32_t moving = s;
     double before, after;
-    if (a->shape_count == 2) {
-      ORB_TRY(find_moving(ctx, a, preset, &moving, &before));
-    } else {
-      ORB_TRY(orb_compose_energy(ctx, &a->shapes[0], &a->shapes[s], preset, &before));
-    }
-    ORB_TRY(follow_shape(ctx, &a->shapes[moving == 0 ? s : 0], &a->shapes[moving], a->landmark_count, preset, &after,
-                         followed));
-    *followed = *followed && after - 1 <= ORB_AGAIN_TIMES * (before - 1) + ORB_AGAIN_MORE;
+    ORB_TRY(orb_compose_energy(ctx, &a->shapes[0], &a->shapes[s], preset, &before));
+    ORB_TRY(follow_shape(ctx, &a->shapes[0], &a->shapes[s], a->landmark_count, preset, &after, followed));
+    *followed = *followed && after <= ORB_AGAIN_MOST && after - 1 <= ORB_AGAIN_TIMES * (before - 1) + ORB_AGAIN_MORE;
     sum += after;
   }
   a->energy = sum / (a->shape_count - 1);
   return ORB_OK;
+}
+
+static orb_status follow(orb_context *ctx, const orb_landmark *landmarks, orb_preset preset, orb_alignment *a,
+                         int *followed) {
+  int swapped;
+  ORB_TRY(put_moved_second(ctx, a, preset, &swapped));
+  orb_status status = follow_all(ctx, a, preset, followed);
+  if (status == ORB_OK && *followed) {
+    status = orb_align_soften(ctx, landmarks, a->landmark_count, preset, a);
+  }
+  if (swapped) {
+    swap(a);
+  }
+  return status;
 }
 
 orb_status orb_align_follow(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -179,10 +218,7 @@ orb_status orb_align_follow(orb_context *ctx, const orb_align_shape *shapes, int
   out->landmark_count = landmark_count;
   orb_status status = open_shapes(ctx, shapes, landmarks, landmark_count, start, out, followed);
   if (status == ORB_OK && *followed) {
-    status = follow_all(ctx, out, options->preset, followed);
-  }
-  if (status == ORB_OK && *followed) {
-    status = orb_align_soften(ctx, landmarks, landmark_count, options->preset, out);
+    status = follow(ctx, landmarks, options->preset, out, followed);
   }
   if (orb_alignment_lacks_room(ctx, status)) {
     status = ORB_OK;

@@ -48,9 +48,9 @@ ORB_API ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_sh
                                             const orb_align_options *options, orb_alignment *out);
 
 /* Aligns shapes again after landmarks were moved, added or removed. Begins where another alignment of the same shapes,
- * in the same order, has ended, so limbs stay where it has them, and nothing is searched: that takes a tenth to a
- * thirtieth of the time. start: of orb_align() or of this function, by any method. Usually its found landmarks are
- * corrected and given here.
+ * in the same order, has ended, so limbs stay where it has them, and nothing is searched: for two shapes of 3,000
+ * vertices that takes a third to a thirtieth of the time. start: of orb_align() or of this function, by any method.
+ * Usually its found landmarks are corrected and given here.
  *
  * out->has_followed 1: the map follows the start. 0: it could not, since the landmarks lead far away from it or have no
  * room on its spheres; the shapes were then aligned by orb_align(). Errors are those of orb_align(). ORB_E_BAD_OPTION

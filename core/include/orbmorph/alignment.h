@@ -122,7 +122,8 @@ typedef struct orb_alignment {
   int32_t suspect_count; /* at most ORB_SUSPECTS_MAX, by falling distance */
   orb_suspect *suspects;
   /* landmark_count: the share of the distortion that lies around each given landmark, as of a suspect; with several
-   * later shapes, the largest. NULL where no suspects are looked for: the map is good, or landmarks are fewer than 4 */
+   * later shapes, the largest. NULL where no suspects are looked for: the map is good or was not
+   * composed, one shape is a part of the other, or landmarks are fewer than 4 */
   double *landmark_shares;
   int32_t rim_count;
   orb_rim_match *rims; /* by rising number of the shape */

@@ -34,7 +34,7 @@ import { listFound, takeLandmarks } from './landmarks';
 import { explain } from './token';
 
 /** The last alignment, with the meshes and landmarks that it is of. */
-let last: { alignment: string; meshes: string; landmarks: string; start?: string } | null = null;
+let lastAlignment: { alignment: string; meshes: string; landmarks: string; start?: string } | null = null;
 
 const meshesOf = ({ shapes }: { shapes: { mesh: string }[] }) => shapes.map(({ mesh }) => mesh).join();
 
@@ -43,13 +43,17 @@ const marksOf = (request: SupermeshRequest | null) =>
 
 function noteAlignment(supermesh: Supermesh, request: SupermeshRequest | null) {
   const { alignment } = supermesh;
-  last = alignment
+  lastAlignment = alignment
     ? { alignment, meshes: meshesOf(supermesh), landmarks: marksOf(request), start: request?.align?.start }
     : null;
 }
 
-/** Where the alignment of a request begins: with corrected landmarks, where the last one ended; with the same, as that. */
+/**
+ * Where the alignment of a request begins: with other landmarks than the last one, where that ended; with the same
+ * landmarks, where that began.
+ */
 function startOf(request: SupermeshRequest) {
+  const last = lastAlignment;
   if (!last || last.meshes !== meshesOf(request)) return undefined;
   return last.landmarks === marksOf(request) ? last.start : last.alignment;
 }
@@ -88,10 +92,10 @@ export function buildRequest(find = false): SupermeshRequest {
  */
 const HULL_MOST = 60_000;
 
-/** The same request with the fast preset; null where the method has none. */
+/** The same request with the fast preset; null where the method has none, and where a start makes the default fast. */
 function fastRequest(request: SupermeshRequest): SupermeshRequest | null {
   const method = request.align?.method;
-  if (method === 'rbf' || method === 'rotate') return null;
+  if (method === 'rbf' || method === 'rotate' || request.align?.start) return null;
   const { transfer: _, ...bare } = request; // pictures would be baked twice
   const triangles = readyShapes().reduce((sum, { mesh }) => sum + mesh!.triangles, 0);
   const hull = request.remesh?.method === 'adaptive' && !request.remesh.max_triangles && triangles <= HULL_MOST;
@@ -113,12 +117,12 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
   const send = (sent: SupermeshRequest) =>
     client.merge(sent, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) });
   // the daemon keeps alignments for a time only
-  const isForgotten = (error: unknown) => !!start && error instanceof ProblemError && error.problem.member === 'start';
-  await follow(
-    running,
-    () => send(request).catch((error) => (isForgotten(error) ? send({ ...request, align }) : Promise.reject(error))),
-    request,
-  );
+  const sendAnew = (error: unknown) => {
+    if (!start || !(error instanceof ProblemError) || error.problem.member !== 'start') throw error;
+    request.align = align;
+    return send(request);
+  };
+  await follow(running, () => send(request).catch(sendAnew), request);
 }
 
 /** Sends the next match of the shown morph, after the last one the first again. */
