@@ -70,6 +70,21 @@ test('upload, pick, name, undo, redo, export, import', async () => {
   await counted(landmarks(page), 3, 'the landmarks are back');
   const [again] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
   assert.deepEqual(JSON.parse(await readFile(await again.path(), 'utf8')), exported);
+
+  // a soft landmark of a file stays soft, also after a reload
+  exported.landmarks[1].weight = 0.3;
+  await page
+    .getByLabel('Landmark file')
+    .setInputFiles({ name: 's.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(exported)) });
+  const hint = page.locator('.action .hint');
+  const says = '2 landmarks will meet exactly, 1 soft one will be drawn together.';
+  await until(async () => (await hint.innerText()) === says, 'it is called soft');
+  await until(() => /[#&]l=[^&]*(\*|%2A)0\.3/.test(page.url()), 'the URL has its weight');
+  await page.reload();
+  await until(async () => (await hint.innerText()) === says, 'it is soft again');
+  const [soft] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
+  const weights = JSON.parse(await readFile(await soft.path(), 'utf8')).landmarks.map(({ weight }) => weight);
+  assert.deepEqual(weights, [undefined, 0.3, undefined]);
   await done();
 });
 

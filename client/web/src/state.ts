@@ -63,6 +63,8 @@ export interface Landmark {
   id: number;
   name: string;
   at: Record<string, Spot>;
+  /** below 1: of a soft landmark, from a file; otherwise absent */
+  weight?: number;
   /** the landmark on the other side of the plane of symmetry */
   twin?: number;
 }
@@ -288,7 +290,11 @@ export const landmarksOnAll = (shapes = readyShapes()): Landmark[] =>
 
 /** The landmarks that are set on every shape, in the daemon's format. */
 export function wireLandmarks(shapes = readyShapes()): WireLandmark[] {
-  return landmarksOnAll(shapes).map(({ name, at }) => ({ name, at: shapes.map(({ key }) => at[key].place) }));
+  return landmarksOnAll(shapes).map(({ name, at, weight }) => ({
+    name,
+    at: shapes.map(({ key }) => at[key].place),
+    ...(weight && { weight }),
+  }));
 }
 
 /** The landmarks that a morph would use. */

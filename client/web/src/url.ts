@@ -3,7 +3,7 @@
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
  * m: meshes on the server, r: a supermesh, j: a job, find=1: one that finds landmarks, go=1: one that makes the morph, where
  * it has no id yet, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l:
- * landmarks (a vertex or x_y_z for each shape), cam: camera, o: options, x: what the morph takes from the shapes (1:skin), s: the parts of
+ * landmarks (a vertex or x_y_z for each shape, and the weight of a soft one), cam: camera, o: options, x: what the morph takes from the shapes (1:skin), s: the parts of
  * the first document that the surface consists of, look: of its materials, e: the weights of its
  * targets that are not shapes.
  */
@@ -154,7 +154,7 @@ function encode(): string {
     (state.landmarks === state.listed ? [] : state.landmarks)
       .map(
         (l) =>
-          `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`,
+          `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.weight ? `*${l.weight}` : ''}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`,
       )
       .join(';'),
   );
@@ -280,8 +280,9 @@ export async function restore() {
       .split(';')
       .filter(Boolean)
       .map((text) => {
-        const [places, name = ''] = text.split('~');
-        return { name, at: places.split(':').map(decodePlace) as Place[] };
+        const [where, name = ''] = text.split('~');
+        const [places, weight = 1] = where.split('*');
+        return { name, at: places.split(':').map(decodePlace) as Place[], weight: Number(weight) };
       });
     if (landmarks.length) await takeLandmarks(landmarks, { undoable: false });
     const paint = PAINTS.find((name) => name === query.get('paint'));

@@ -124,12 +124,17 @@ export function forgetShape(key: string) {
   set({ landmarks, past: [], future: [] });
 }
 
-type Listed = Pick<WireLandmark, 'name' | 'at'>[];
+type Listed = Pick<WireLandmark, 'name' | 'at' | 'weight'>[];
 
 /** The landmarks of a file or a response on the shapes; those that fit no shape are omitted. */
 async function located(list: Listed, snap: boolean): Promise<Landmark[]> {
   const shapes = readyShapes();
-  const made: Landmark[] = list.map((l) => ({ id: ++count, name: l.name ?? '', at: {} }));
+  const made: Landmark[] = list.map(({ name = '', weight = 1 }) => ({
+    id: ++count,
+    name,
+    at: {},
+    ...(weight < 1 && { weight }),
+  }));
   await Promise.all(
     shapes.map(async (shape, index) => {
       const wanted = list.map((l, row) => ({ row, place: l.at?.[index] })).filter((w) => w.place);

@@ -101,12 +101,22 @@ function missing(ready: number) {
   return ready === 1 ? 'Add one more shape.' : 'Add two shapes.';
 }
 
+/** Which of the landmarks meet. */
+function meeting(landmarks: number, soft: number) {
+  const exact = landmarks - soft;
+  const drawn = soft ? `${soft} soft one${soft > 1 ? 's' : ''} will be drawn together` : '';
+  const met = exact ? `${exact} landmark${exact > 1 ? 's' : ''} will meet exactly` : '';
+  return `${[met, drawn].filter(Boolean).join(', ')}.`;
+}
+
 export function Action() {
   const ready = readyShapes().length;
   const { running } = state;
   const busy = state.shapes.some((shape) => shape.state === 'reading' || shape.state === 'uploading');
   const again = state.tab === 'morph' && !!state.result;
-  const landmarks = givenLandmarks().length;
+  const given = givenLandmarks();
+  const landmarks = given.length;
+  const soft = given.filter(({ weight }) => weight).length;
   return (
     <div class="action">
       <Notice />
@@ -127,7 +137,7 @@ export function Action() {
                 ? 'Uploading…'
                 : missing(ready)
               : landmarks
-                ? `${landmarks} landmark${landmarks > 1 ? 's' : ''} will meet exactly.`
+                ? meeting(landmarks, soft)
                 : 'Shapes are matched without landmarks.'}
           </p>
         </>

@@ -113,6 +113,11 @@ export function LandmarksInspector() {
                   onFocus={() => state.active !== landmark.id && set({ active: landmark.id })}
                   onChange={(event) => renameLandmark(landmark.id, event.currentTarget.value.trim())}
                 />
+                {landmark.weight && (
+                  <span class="badge" title={`Soft: weight ${landmark.weight}`}>
+                    soft
+                  </span>
+                )}
                 {missing.length > 0 && (
                   <span class="badge warn" title={`Not yet on ${missing.map((s) => s.name).join(', ')}`}>
                     {missing.length} to go
