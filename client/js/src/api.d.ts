@@ -224,7 +224,7 @@ export type SupermeshRequest = {
   align?: {
     /** Default: pin with landmarks, auto without. pin and rbf require landmarks. */
     method?: 'pin' | 'rbf' | 'rotate' | 'auto';
-    /** The member alignment of a supermesh of the same meshes, in the same order: begin where that alignment ended. For landmarks that were corrected: nothing is searched, so it takes a fraction of the time, and limbs stay where they are. Needs landmarks, and the method pin or auto. The problem bad-option with the member start says that the alignment is no longer kept. */
+    /** The member alignment of a supermesh of the same meshes, in the same order: begin where that alignment ended. For landmarks that were corrected: nothing is searched, so it takes a fraction of the time, and limbs stay where they are. Needs landmarks, and the method pin or auto; the preset fast makes the same map as default then. The problem bad-option with the member start says that the alignment is no longer kept. */
     start?: string;
     options?: {
       /** Default: "default". */
