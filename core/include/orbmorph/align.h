@@ -50,7 +50,7 @@ ORB_API ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_sh
 /* Aligns shapes again after landmarks were moved, added or removed. Begins where another alignment of the same shapes,
  * in the same order, has ended, so limbs stay where it has them, and nothing is searched: for two shapes of 3,000
  * vertices that takes a third to a thirtieth of the time. start: of orb_align() or of this function, by any method.
- * Usually its found landmarks are corrected and given here.
+ * Usually its found landmarks are corrected and given here. The preset fast makes the same map as the default one.
  *
  * out->has_followed 1: the map follows the start. 0: it could not, since the landmarks lead far away from it or have no
  * room on its spheres; the shapes were then aligned by orb_align(). Errors are those of orb_align(). ORB_E_BAD_OPTION
