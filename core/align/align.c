@@ -175,26 +175,12 @@ static orb_status align_by_rotation(orb_context *ctx, const orb_align_shape shap
   return orb_align_given(ctx, shapes, 2, NULL, 0, &rotated, other);
 }
 
-/* Swaps the two shapes of an alignment without rims, with their landmarks, and the places of its alternatives. */
-static void swap_shapes(orb_alignment *a) {
-  const orb_aligned_shape first = a->shapes[0];
-  a->shapes[0] = a->shapes[1];
-  a->shapes[1] = first;
-  for (int32_t i = 0; i < a->alternative_count; i++) {
-    for (int32_t k = 0; k < a->alternatives[i].count; k++) {
-      orb_place *at = a->alternatives[i].at + 2 * (size_t)k, place = at[0];
-      at[0] = at[1];
-      at[1] = place;
-    }
-  }
-}
-
 /* The search from the second shape to the first one. Its map is another one. */
 static orb_status align_back(orb_context *ctx, const orb_align_shape shapes[2], const orb_align_options *options,
                              orb_alignment *other) {
   const orb_align_shape swapped[2] = {shapes[1], shapes[0]};
   ORB_TRY(orb_align_auto(ctx, swapped, 2, options, other));
-  swap_shapes(other);
+  orb_alignment_swap(other);
   return ORB_OK;
 }
 
@@ -343,7 +329,7 @@ static orb_status align_swapped(orb_context *ctx, const orb_align_shape shapes[2
   orb_free(ctx, swapped);
   orb_free(ctx, place);
   if (status == ORB_OK) {
-    swap_shapes(out);
+    orb_alignment_swap(out);
   } else if (orb_context_error(ctx)->shape >= 0) {
     orb_context_error_edit(ctx)->shape = 1 - orb_context_error(ctx)->shape;
   }
@@ -420,8 +406,7 @@ static orb_status follow(orb_context *ctx, const orb_align_shape *shapes, int32_
     return ORB_OK;
   }
   out->has_followed = 1;
-  ORB_TRY(orb_align_rims(ctx, options, out));
-  return describe(ctx, shapes, landmarks, landmark_count, options, out->energy, out);
+  return orb_align_rims(ctx, options, out);
 }
 
 static orb_status check_start(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -438,43 +423,22 @@ static orb_status check_start(orb_context *ctx, const orb_align_shape *shapes, i
   return ORB_OK;
 }
 
-orb_status orb_align_again(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                           const orb_alignment *start, orb_alignment *out) {
-  memset(out, 0, sizeof *out);
-  ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
-  ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
-  ORB_TRY(check_start(ctx, shapes, shape_count, landmark_count, options, start));
-  const char *before = orb_progress_only(ctx, "align");
-  orb_progress_expect(ctx, expected_steps(shapes, shape_count, options));
-  orb_status status = follow(ctx, shapes, shape_count, landmarks, landmark_count, options, start, out);
-  const int followed = out->has_followed;
-  if (status != ORB_OK) {
-    orb_alignment_free(ctx, out);
-  } else if (followed) {
-    orb_progress(ctx, "align", 1);
-  }
-  orb_progress_expect(ctx, 0);
-  (void)orb_progress_only(ctx, before);
-  return status != ORB_OK || followed ? status
-                                      : orb_align(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
-}
-
-orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                     const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                     orb_alignment *out) {
-  memset(out, 0, sizeof *out);
-  ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
-  ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
+/* Aligns from where the start has ended, if there is one and the landmarks let the map follow it, and otherwise anew.
+ */
+static orb_status align_from(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                             const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                             const orb_alignment *start, orb_alignment *out) {
   const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
   orb_progress_expect(ctx, expected_steps(shapes, shape_count, options));
   const int is_pair = shape_count == 2 && (options->method == ORB_ALIGN_AUTO || options->method == ORB_ALIGN_PIN);
   double energy = INFINITY;
-  orb_status status = is_pair
-                          ? align_pair(ctx, shapes, landmarks, landmark_count, options, out, &energy)
-                          : align_ordered(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &energy);
+  orb_status status = start ? follow(ctx, shapes, shape_count, landmarks, landmark_count, options, start, out) : ORB_OK;
+  if (status == ORB_OK && !out->has_followed) {
+    status = is_pair ? align_pair(ctx, shapes, landmarks, landmark_count, options, out, &energy)
+                     : align_ordered(ctx, shapes, shape_count, landmarks, landmark_count, options, out, &energy);
+  }
   if (status == ORB_OK) {
-    status = describe(ctx, shapes, landmarks, landmark_count, options, energy, out);
+    status = describe(ctx, shapes, landmarks, landmark_count, options, out->has_followed ? out->energy : energy, out);
   }
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
@@ -484,4 +448,23 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   orb_progress_expect(ctx, 0);
   (void)orb_progress_only(ctx, before);
   return status;
+}
+
+orb_status orb_align_again(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                           const orb_alignment *start, orb_alignment *out) {
+  memset(out, 0, sizeof *out);
+  ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
+  ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
+  ORB_TRY(check_start(ctx, shapes, shape_count, landmark_count, options, start));
+  return align_from(ctx, shapes, shape_count, landmarks, landmark_count, options, start, out);
+}
+
+orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                     const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                     orb_alignment *out) {
+  memset(out, 0, sizeof *out);
+  ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
+  ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
+  return align_from(ctx, shapes, shape_count, landmarks, landmark_count, options, NULL, out);
 }

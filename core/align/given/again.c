@@ -155,13 +155,6 @@ static orb_status follow_shape(orb_context *ctx, orb_aligned_shape *fixed, orb_a
   return ORB_OK;
 }
 
-/* Exchanges the two shapes. */
-static void swap(orb_alignment *a) {
-  const orb_aligned_shape first = a->shapes[0];
-  a->shapes[0] = a->shapes[1];
-  a->shapes[1] = first;
-}
-
 /* Puts the shape that has moved second: the energy of a map is that of the triangles that move, so it is low. */
 static orb_status put_moved_second(orb_context *ctx, orb_alignment *a, orb_preset preset, int *swapped) {
   double energy[2];
@@ -170,7 +163,7 @@ static orb_status put_moved_second(orb_context *ctx, orb_alignment *a, orb_prese
     ORB_TRY(orb_compose_energy(ctx, &a->shapes[1 - s], &a->shapes[s], preset, &energy[s]));
   }
   if (a->shape_count == 2 && energy[0] < energy[1]) {
-    swap(a);
+    orb_alignment_swap(a);
     *swapped = 1;
   }
   return ORB_OK;
@@ -200,7 +193,7 @@ static orb_status follow(orb_context *ctx, const orb_landmark *landmarks, orb_pr
     status = orb_align_soften(ctx, landmarks, a->landmark_count, preset, a);
   }
   if (swapped) {
-    swap(a);
+    orb_alignment_swap(a);
   }
   return status;
 }

@@ -41,6 +41,19 @@ void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignme
   memset(other, 0, sizeof *other);
 }
 
+void orb_alignment_swap(orb_alignment *alignment) {
+  const orb_aligned_shape first = alignment->shapes[0];
+  alignment->shapes[0] = alignment->shapes[1];
+  alignment->shapes[1] = first;
+  for (int32_t i = 0; i < alignment->alternative_count; i++) {
+    for (int32_t k = 0; k < alignment->alternatives[i].count; k++) {
+      orb_place *at = alignment->alternatives[i].at + 2 * (size_t)k, place = at[0];
+      at[0] = at[1];
+      at[1] = place;
+    }
+  }
+}
+
 void orb_alignment_forget_landmarks(orb_context *ctx, int32_t kept, orb_alignment *alignment) {
   alignment->landmark_count = kept;
   for (int32_t s = 0; s < alignment->shape_count && kept == 0; s++) {

@@ -77,6 +77,9 @@ int orb_alignment_lacks_room(orb_context *ctx, orb_status status);
 /* Moves the alignment of less energy to *one, and frees the other. *other is empty then. */
 void orb_alignment_keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other);
 
+/* Swaps the two shapes of an alignment without rims, with their landmarks, and the places of its alternatives. */
+void orb_alignment_swap(orb_alignment *alignment);
+
 /* Makes the landmarks of an alignment, but for the first `kept`, ordinary vertices: they were held, but not given. */
 void orb_alignment_forget_landmarks(orb_context *ctx, int32_t kept, orb_alignment *alignment);
 
