@@ -63,7 +63,7 @@ count_junit() {
 # Its daemon takes the numeric objects of the release build. So scenarios that mostly compute, and those that look at
 # documents, programs, memory or time, run in the release build only, as do those that run with PostgreSQL and S3: their unit
 # tests run here.
-release_only='openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|migrate|nodes|cluster'
+release_only='bench|holes|openapi_tools|shell|readme|real_pairs|examples|demo|attacks|s3|migrate|nodes|cluster'
 # Most of their time passes in waiting for other servers and for clocks. In a full run they are a chain of their own, so
 # that none of them is left alone at the end.
 mostly_waiting='nodes|cluster|migrate|s3'

@@ -6,8 +6,8 @@
                               [--store DIR] [--fresh] [--out FILE.md] [--json FILE.json]
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
-docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed, `parts` 81 heads and busts, `apes` 48 people
-with the proportions of an ape and other people. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half
+docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed, `parts` 81 heads and busts, `plans` spiders,
+beetles, hands, birds, lizards and fish, `apes` 48 people with the proportions of an ape and other people. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half
 that is only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
@@ -318,6 +318,7 @@ def list_pairs(options):
             "drawn": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, map(int, options.seeds.split(","))),
             "apes": correspond_pairs.ape_pairs(meshes, options.store),
             "parts": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, of_parts=True),
+            "plans": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, of_plans=True),
             "real": correspond_pairs.real(meshes, surface_of)}
     unknown = set(wanted) - set(sets)
     if unknown:

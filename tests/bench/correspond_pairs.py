@@ -60,8 +60,8 @@ def folder_pairs(name, folder, rows, half, make=lambda *_: None):
                    lambda first=first, second=second: make(first, second))
 
 
-def listed(folder):
-    with (folder / "pairs.csv").open() as rows:
+def listed(folder, table="pairs"):
+    with (folder / f"{table}.csv").open() as rows:
         return [(row["A"], row["B"], row["kind"]) for row in csv.DictReader(rows)]
 
 
@@ -133,8 +133,8 @@ def ape_pairs(meshes, store):
     yield from folder_pairs("apes", folder, rows, lambda i, _: "report" if i % apes.CHOSEN_ON else "choose", make)
 
 
-def animals(program, store, seeds=(), of_parts=False):
-    """Generated animals, in a folder for each build of the program: the pairs that it lists, drawn ones, or parts. A body
+def animals(program, store, seeds=(), of_parts=False, of_plans=False):
+    """Generated bodies, in a folder for each build of the program: the pairs that it lists, drawn ones, parts, or other plans. A body
     is written when it is first needed."""
     if not program.exists():
         return
@@ -154,6 +154,8 @@ def animals(program, store, seeds=(), of_parts=False):
 
     if of_parts:
         yield from folder_pairs("parts", folder, parts(), lambda i, _: "choose" if i < PARTS_CHOSEN_ON else "report", make)
+    elif of_plans:
+        yield from folder_pairs("plans", folder, listed(folder, "plans"), lambda _, title: half_of(title), make)
     elif not seeds:
         yield from folder_pairs("animals", folder, listed(folder), lambda _, title: half_of(title), make)
     for seed in seeds:

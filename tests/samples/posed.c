@@ -1,7 +1,7 @@
 /* Writes posed bodies with true correspondences into a folder.
  *
- *   orbmorph-posed DIR          writes samples.csv and pairs.csv, the table of pairs
- *   orbmorph-posed DIR BODY...  writes BODY.obj and BODY.truth.csv
+ *   orbmorph-posed DIR          writes samples.csv, and the tables of pairs: pairs.csv of animals and plans.csv of
+ * kinds of other plans orbmorph-posed DIR BODY...  writes BODY.obj and BODY.truth.csv
  *
  * A body is KIND-POSE or KIND-VARIANT-POSE. Its vertices and triangles are shuffled; some bodies are turned, and some
  * have other units. All that follows from the name: the files are the same on each run.
@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "posed.h"
+#include "primitives.h"
 
 typedef struct pair {
   const char *first, *second, *kind;
@@ -56,7 +57,17 @@ static const pair pairs[] = {
     {"head-nod", "bust-look", KINDS},
     {"head-slim-stand", "bust-stout-stand", KINDS},
 };
-enum { PAIRS = sizeof pairs / sizeof pairs[0] };
+#define PLAN_PAIRS(kind, one, two, three)                                                                          \
+  {kind "-stand", kind "-" one, POSES}, {kind "-" two, kind "-stand", POSES}, {kind "-" one, kind "-" two, POSES}, \
+      {kind "-" three, kind "-" one, POSES}, {kind "-stand", kind "-slim-" two, PROPORTIONS}, {                    \
+    kind "-stout-" three, kind "-" one, PROPORTIONS                                                                \
+  }
+
+static const pair plans[] = {
+    PLAN_PAIRS("spider", "creep", "rear", "curl"), PLAN_PAIRS("beetle", "creep", "rear", "curl"),
+    PLAN_PAIRS("hand", "grip", "splay", "point"),  PLAN_PAIRS("bird", "fly", "glide", "perch"),
+    PLAN_PAIRS("lizard", "bend", "crawl", "walk"), PLAN_PAIRS("fish", "swim", "dart", "turn"),
+};
 
 static FILE *open_file(const char *folder, const char *name, const char *ending) {
   char path[4096];
@@ -173,17 +184,22 @@ static void make_body(const char *folder, const char *name) {
   free(mesh.triangles);
 }
 
+static void write_pairs(const char *folder, const char *name, const pair *rows, size_t count) {
+  FILE *file = open_file(folder, name, ".csv");
+  fputs("A,B,kind\n", file);
+  for (size_t i = 0; i < count; i++)
+    fprintf(file, "%s.obj,%s.obj,\"%s\"\n", rows[i].first, rows[i].second, rows[i].kind);
+  close_file(file);
+}
+
 static void write_tables(const char *folder) {
   FILE *file = open_file(folder, "samples", ".csv");
   fputs("sample,part\n", file);
   for (int i = 0; i < posed_sample_count(); i++)
     fprintf(file, "%d,%s\n", i, posed_sample_part(i));
   close_file(file);
-  file = open_file(folder, "pairs", ".csv");
-  fputs("A,B,kind\n", file);
-  for (int i = 0; i < PAIRS; i++)
-    fprintf(file, "%s.obj,%s.obj,\"%s\"\n", pairs[i].first, pairs[i].second, pairs[i].kind);
-  close_file(file);
+  write_pairs(folder, "pairs", pairs, COUNT(pairs));
+  write_pairs(folder, "plans", plans, COUNT(plans));
 }
 
 int main(int argc, char **argv) {

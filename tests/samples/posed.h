@@ -36,7 +36,15 @@ typedef enum posed_limb {
   HLL,
   HLC,
   HLF,
-  FACE, /* of heads and busts: rays from its centre */
+  FACE,   /* of heads and busts: rays from its centre */
+  LIMB_A, /* legs, wings, fingers or fins of other plans (posed_plans.c) */
+  LIMB_B,
+  LIMB_C,
+  LIMB_D,
+  LIMB_E,
+  LIMB_F,
+  LIMB_G,
+  LIMB_H,
   LIMB_COUNT
 } posed_limb;
 
@@ -54,6 +62,8 @@ typedef struct posed_kind {
 } posed_kind;
 
 const posed_kind *posed_find(const char *name);
+extern const posed_kind posed_plans[];
+extern const int posed_plan_count;
 
 /* A kind with its proportions: primitives in its rest pose. */
 typedef struct posed_rest {

@@ -210,5 +210,8 @@ const posed_kind *posed_find(const char *name) {
   for (size_t i = 0; i < COUNT(kinds); i++)
     if (!strcmp(kinds[i].animal->name, name))
       return &kinds[i];
+  for (int i = 0; i < posed_plan_count; i++)
+    if (!strcmp(posed_plans[i].animal->name, name))
+      return &posed_plans[i];
   return NULL;
 }

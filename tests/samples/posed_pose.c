@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "posed.h"
+#include "primitives.h"
 
 enum { X, Y, Z }; /* about the right (Z) a limb below swings forward; about up (Y) what is ahead swings to the left */
 
@@ -26,7 +27,7 @@ typedef struct turn {
 #define D60 0.5774
 #define D80 0.8391
 
-static const turn turns[] = {
+static const turn animal_turns[] = {
     {"walk", FRU, Z, 0, D20},    {"walk", FRL, Z, 0, -D15},   {"walk", FLU, Z, 0, -D20},    {"walk", HRU, Z, 0, -D20},
     {"walk", HLU, Z, 0, D20},    {"walk", HLL, Z, 0, -D15},   {"walk", TAIL, Z, 1, D10},    {"walk", NECK, Z, 0, -D10},
     {"walk", SNOUT, Z, 1, D10},  {"run", FRU, Z, 0, D50},     {"run", FRL, Z, 0, -D40},     {"run", FLU, Z, 0, D30},
@@ -41,6 +42,40 @@ static const turn turns[] = {
     {"sit", TAIL, Y, 1, -D15},   {"lift", FRU, Z, 0, D60},    {"lift", FRL, Z, 0, -D80},    {"lift", HEAD, Y, 0, -D20},
     {"lift", HLU, Z, 0, -D15},   {"lift", TAIL, Z, 1, -D20},  {"nod", FACE, Z, 0, -D20},    {"look", FACE, Y, 0, D30},
 };
+
+/* Of kinds of other plans. */
+static const turn plan_turns[] = {
+    {"creep", LIMB_A, Y, 0, D15},  {"creep", LIMB_B, Y, 0, -D15}, {"creep", LIMB_B, X, 0, -D20},
+    {"creep", LIMB_C, Y, 0, D15},  {"creep", LIMB_D, Y, 0, -D15}, {"creep", LIMB_D, X, 0, -D20},
+    {"creep", LIMB_E, Y, 0, D15},  {"creep", LIMB_E, X, 0, D20},  {"creep", LIMB_F, Y, 0, -D15},
+    {"creep", LIMB_G, Y, 0, D15},  {"creep", LIMB_G, X, 0, D20},  {"creep", LIMB_H, Y, 0, -D15},
+    {"rear", LIMB_A, X, 0, -D40},  {"rear", LIMB_E, X, 0, D40},   {"rear", LIMB_B, X, 0, -D20},
+    {"rear", LIMB_F, X, 0, D20},   {"rear", TAIL, Z, 0, D20},     {"rear", TORSO, Z, 0, D15},
+    {"curl", LIMB_A, X, 1, D20},   {"curl", LIMB_B, X, 1, D20},   {"curl", LIMB_C, X, 1, D20},
+    {"curl", LIMB_D, X, 1, D20},   {"curl", LIMB_E, X, 1, -D20},  {"curl", LIMB_F, X, 1, -D20},
+    {"curl", LIMB_G, X, 1, -D20},  {"curl", LIMB_H, X, 1, -D20},  {"grip", LIMB_B, Z, 1, -D30},
+    {"grip", LIMB_C, Z, 1, -D30},  {"grip", LIMB_D, Z, 1, -D30},  {"grip", LIMB_E, Z, 1, -D30},
+    {"grip", LIMB_A, Z, 1, -D20},  {"point", LIMB_C, Z, 1, -D50}, {"point", LIMB_D, Z, 1, -D50},
+    {"point", LIMB_E, Z, 1, -D50}, {"point", LIMB_A, Z, 1, -D15}, {"splay", LIMB_A, X, 0, D20},
+    {"splay", LIMB_B, X, 0, D15},  {"splay", LIMB_D, X, 0, -D10}, {"splay", LIMB_E, X, 0, -D20},
+    {"fly", LIMB_A, X, 1, -D15},   {"fly", LIMB_E, X, 1, D15},    {"fly", HRU, Z, 0, -D40},
+    {"fly", HLU, Z, 0, -D40},      {"fly", TAIL, Z, 1, D10},      {"glide", LIMB_A, Y, 1, -D20},
+    {"glide", LIMB_E, Y, 1, D20},  {"glide", HRU, Z, 0, -D60},    {"glide", HLU, Z, 0, -D60},
+    {"glide", NECK, Z, 0, -D30},   {"perch", LIMB_A, Y, 0, -D60}, {"perch", LIMB_E, Y, 0, D60},
+    {"perch", NECK, Y, 0, D40},    {"perch", HEAD, Y, 0, D20},    {"perch", HRL, Z, 0, -D30},
+    {"perch", HLL, Z, 0, -D30},    {"bend", TORSO, Y, 1, D15},    {"bend", TAIL, Y, 1, -D20},
+    {"bend", NECK, Y, 0, D30},     {"bend", FRU, Y, 0, D20},      {"bend", HLU, Y, 0, D20},
+    {"crawl", FRU, Y, 0, D30},     {"crawl", FLU, Y, 0, D30},     {"crawl", HRU, Y, 0, -D30},
+    {"crawl", HLU, Y, 0, -D30},    {"crawl", TAIL, Y, 1, D15},    {"crawl", TORSO, Y, 1, -D10},
+    {"swim", TORSO, Y, 1, D15},    {"swim", TAIL, Y, 1, D30},     {"swim", LIMB_D, X, 0, D30},
+    {"swim", LIMB_E, X, 0, -D20},  {"dart", TORSO, Y, 1, -D10},   {"dart", TAIL, Y, 1, -D20},
+    {"dart", LIMB_D, Y, 0, -D30},  {"dart", LIMB_E, Y, 0, D30},   {"dart", LIMB_C, Z, 0, D20},
+};
+
+static const struct {
+  const turn *turn;
+  size_t count;
+} tables[] = {{animal_turns, COUNT(animal_turns)}, {plan_turns, COUNT(plan_turns)}};
 
 /* A rotation and a translation: the rows of the matrix, then the translation. */
 typedef struct motion {
@@ -75,22 +110,30 @@ static motion turned(const motion *first, const double p[3], int axis, double ha
   return out;
 }
 
+static int is_pose(const char *pose) {
+  int known = !strcmp(pose, "stand");
+  for (size_t k = 0; k < COUNT(tables); k++)
+    for (size_t t = 0; t < tables[k].count; t++)
+      known |= !strcmp(tables[k].turn[t].pose, pose);
+  return known;
+}
+
 static void move_bones(const posed_rest *rest, const char *pose, motion *of) {
   const motion still = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
   const posed_bone *bones = rest->kind->bones;
-  int known = !strcmp(pose, "stand");
-  for (size_t t = 0; t < sizeof turns / sizeof turns[0]; t++)
-    known |= !strcmp(turns[t].pose, pose);
-  if (!known) {
+  if (!is_pose(pose)) {
     fprintf(stderr, "there is no pose '%s'\n", pose);
     exit(1);
   }
   for (size_t i = 0; i < rest->animal.primitive_count; i++) {
     const int parent = bones[i].parent, is_first = parent < 0 || bones[parent].limb != bones[i].limb;
     of[i] = parent < 0 ? still : of[parent];
-    for (size_t t = 0; t < sizeof turns / sizeof turns[0]; t++)
-      if (!strcmp(turns[t].pose, pose) && turns[t].limb == bones[i].limb && (is_first || turns[t].every))
-        of[i] = turned(&of[i], rest->primitives[i].a, turns[t].axis, turns[t].half);
+    for (size_t k = 0; k < COUNT(tables); k++)
+      for (size_t t = 0; t < tables[k].count; t++) {
+        const turn *one = &tables[k].turn[t];
+        if (!strcmp(one->pose, pose) && one->limb == bones[i].limb && (is_first || one->every))
+          of[i] = turned(&of[i], rest->primitives[i].a, one->axis, one->half);
+      }
   }
 }
 

@@ -25,6 +25,12 @@ static const ray first_rays[] = {
     {HLU, 0.7, {-1, 0}, 0},  {NECK, 0.5, {1, 0}, 0},   {NECK, 0.5, {-1, 0}, 0},  {SNOUT, 0.5, {0, -1}, 0},
 };
 
+/* Tips of appendages of other plans, after those. */
+static const ray plan_rays[] = {
+    {LIMB_A, 1, {0, 0}, 1}, {LIMB_B, 1, {0, 0}, 1}, {LIMB_C, 1, {0, 0}, 1}, {LIMB_D, 1, {0, 0}, 1},
+    {LIMB_E, 1, {0, 0}, 1}, {LIMB_F, 1, {0, 0}, 1}, {LIMB_G, 1, {0, 0}, 1}, {LIMB_H, 1, {0, 0}, 1},
+};
+
 static ray rays[RAYS_MOST];
 static int ray_count;
 
@@ -50,22 +56,37 @@ static void add_face(void) {
   }
 }
 
-static void list_rays(void) {
-  if (ray_count)
-    return;
-  const int first = (int)(sizeof first_rays / sizeof first_rays[0]);
-  memcpy(rays, first_rays, sizeof first_rays);
-  ray_count = first;
-  for (int limb = TORSO; limb < FACE; limb++)
-    add_limb((posed_limb)limb);
-  add_face();
+/* Shuffles the rays from `first` on: any part of the list then spreads over the body. */
+static void shuffle_rays(int first) {
   unsigned seed = 7;
-  for (int i = ray_count - 1; i > first; i--) { /* any part of the list then spreads over the body */
+  for (int i = ray_count - 1; i > first; i--) {
     const int j = first + (int)posed_random(&seed, (unsigned)(i - first + 1));
     const ray kept = rays[i];
     rays[i] = rays[j];
     rays[j] = kept;
   }
+}
+
+static void add_rays(const ray *list, size_t size) {
+  memcpy(rays + ray_count, list, size);
+  ray_count += (int)(size / sizeof *list);
+}
+
+/* Rays of other plans come last: then the places that are measured on animals do not depend on them. */
+static void list_rays(void) {
+  if (ray_count)
+    return;
+  add_rays(first_rays, sizeof first_rays);
+  add_rays(plan_rays, sizeof plan_rays);
+  int first = ray_count;
+  for (int limb = TORSO; limb < FACE; limb++)
+    add_limb((posed_limb)limb);
+  add_face();
+  shuffle_rays(first);
+  first = ray_count;
+  for (int limb = LIMB_A; limb < LIMB_COUNT; limb++)
+    add_limb((posed_limb)limb);
+  shuffle_rays(first);
 }
 
 int posed_sample_count(void) {
@@ -74,9 +95,10 @@ int posed_sample_count(void) {
 }
 
 const char *posed_sample_part(int sample) {
-  static const char *const names[LIMB_COUNT] = {"none",  "torso", "neck",  "head",  "snout", "tail",  "ear.R", "ear.L",
-                                                "arm.R", "arm.R", "arm.R", "arm.L", "arm.L", "arm.L", "leg.R", "leg.R",
-                                                "leg.R", "leg.R", "leg.L", "leg.L", "leg.L", "leg.L", "face"};
+  static const char *const names[LIMB_COUNT] = {
+      "none",  "torso",  "neck",   "head",   "snout",  "tail",   "ear.R",  "ear.L",  "arm.R", "arm.R", "arm.R",
+      "arm.L", "arm.L",  "arm.L",  "leg.R",  "leg.R",  "leg.R",  "leg.R",  "leg.L",  "leg.L", "leg.L", "leg.L",
+      "face",  "limb.A", "limb.B", "limb.C", "limb.D", "limb.E", "limb.F", "limb.G", "limb.H"};
   list_rays();
   return names[rays[sample].limb];
 }
@@ -110,14 +132,15 @@ static int bone_at(const posed_rest *rest, posed_limb limb, double at, double *s
   return last;
 }
 
-/* Three axes of a bone: right, back or down, along. An ear's first axis is forward, since ears point to the side. */
+/* Three axes of a bone: right, back or down, along. The first axis of an ear, or of an
+ * appendage of another plan, is forward, since these point to the side. */
 static void frame_of(const orb_primitive *o, posed_limb limb, double frame[3][3]) {
   static const double face[3][3] = {{0, 0, 1}, {0, -1, 0}, {1, 0, 0}};
   if (limb == FACE) {
     memcpy(frame, face, sizeof face);
     return;
   }
-  const int is_ear = limb == EAR_R || limb == EAR_L;
+  const int is_ear = limb == EAR_R || limb == EAR_L || limb >= LIMB_A;
   double *right = frame[0], *back = frame[1], *along = frame[2], size = 0, part;
   for (int k = 0; k < 3; k++) {
     along[k] = o->kind == SAMPLE_CONE ? o->b[k] - o->a[k] : o->axis[0][k] + 1.3 * o->axis[1][k];

@@ -188,8 +188,8 @@ typedef struct named_body {
 } named_body;
 
 /* The mean errors between two bodies, relative to the diagonal: without landmarks, and with the first true places,
- * FEW at most. Returns the energy with them. */
-static double errors_of(const named_body of[2], int few, double error[2]) {
+ * FEW at most. seed: of the triangles of the first; the second has the next one. Returns the energy with them. */
+static double errors_of_seed(const named_body of[2], unsigned seed, int few, double error[2]) {
   double energy = 0;
   const int samples = posed_sample_count();
   posed_place *place[2];
@@ -199,7 +199,7 @@ static double errors_of(const named_body of[2], int few, double error[2]) {
   for (int s = 0; s < 2; s++) {
     place[s] = calloc((size_t)samples, sizeof **place);
     assert_non_null(place[s]);
-    generate(ctx, of[s].kind, of[s].build, of[s].pose, (unsigned)s + 1, &bodies[s], place[s]);
+    generate(ctx, of[s].kind, of[s].build, of[s].pose, seed + (unsigned)s, &bodies[s], place[s]);
   }
   keep_common((const posed_place *[2]){place[0], place[1]}, samples, bodies);
   assert_true(bodies[0].count > 100 && few <= FEW);
@@ -234,6 +234,10 @@ static double errors_of(const named_body of[2], int few, double error[2]) {
   free(place[1]);
   unload(ctx, bodies);
   return energy;
+}
+
+static double errors_of(const named_body of[2], int few, double error[2]) {
+  return errors_of_seed(of, 1, few, error);
 }
 
 typedef struct edge {
@@ -417,6 +421,22 @@ static void one_landmark_keeps_the_match(void **state) {
   assert_true(error[1] <= 0.02);
 }
 
+/* Five landmarks along the middle of a spider, of its tail, palps and back, say nothing of its legs. While nothing
+ * improved matches that agree with landmarks, the legs of three of thirteen spiders went to other legs; with this seed
+ * the error was 0.09. */
+static void landmarks_in_the_middle_leave_legs_open(void **state) {
+  (void)state;
+  if (IS_SLOW) {
+    skip(); /* matches without landmarks run the same code */
+  }
+  double error[2];
+  const double energy =
+      errors_of_seed((named_body[2]){{"spider", "", "creep"}, {"spider", "", "rear"}}, 7, FEWER, error);
+  assert_true(energy <= 1.2);
+  assert_true(error[0] <= 0.015);
+  assert_true(error[1] <= 0.015);
+}
+
 /* One body is twisted. A match that exchanges left with right and front with back would move places by half a body. */
 static void a_twist_is_matched(void **state) {
   (void)state;
@@ -494,6 +514,7 @@ int main(void) {
                                      cmocka_unit_test(few_landmarks_of_other_kinds_use_a_match),
                                      cmocka_unit_test(other_kinds_are_no_parts),
                                      cmocka_unit_test(one_landmark_keeps_the_match),
+                                     cmocka_unit_test(landmarks_in_the_middle_leave_legs_open),
                                      cmocka_unit_test(a_twist_is_matched),
                                      cmocka_unit_test(finer_triangles_are_as_sure),
                                      cmocka_unit_test(distances_tell_a_pose)};

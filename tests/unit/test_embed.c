@@ -227,7 +227,7 @@ static void cancel_now(void *user, const char *stage, double fraction) {
 static void test_cancel_everywhere(void **unused) {
   (void)unused;
   orb_context *plain = open_context(1);
-  orb_mesh mesh = shape_globe(plain, 20000, 2);
+  orb_mesh mesh = shape_globe(plain, IS_SLOW ? 5000 : 20000, 2);
   int cancelled = 0, done = 0;
   for (int n = 0; !done; n += 7) {
     cancelling c = {.left = n};

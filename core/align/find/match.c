@@ -191,15 +191,16 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
   return !hint || stretch <= hint->sure || bend_of(one, 1) <= ORB_FIND_HINT_BEND;
 }
 
-/* Do landmarks leave open which limb is which? Those of one body do not, and neither do many of unlike shapes: of 83
- * pairs of animals of other kinds (seed 31), with 8 and with 24 landmarks improved trials led to as much error. */
-static int leaves_limbs_open(const orb_hint_places *hint, int are_unlike) {
-  return !hint->tells || (are_unlike && hint->count < ORB_FIND_HINT_FEW);
+/* Do landmarks leave open which limb is which? A few do: five along the middle of a spider say nothing of its legs.
+ * More do not, even where shapes are unlike: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24
+ * landmarks improved trials led to as much error. */
+static int leaves_limbs_open(const orb_hint_places *hint) {
+  return !hint->tells || hint->count < ORB_FIND_HINT_FEW;
 }
 
 /* Improves trials that bend small copies much, unless landmarks say which limb is which. */
-static orb_status improve_trials(orb_trials *small, int are_unlike) {
-  if (!leaves_limbs_open(&small->hint, are_unlike) || !orb_trials_bend_much(small)) {
+static orb_status improve_trials(orb_trials *small) {
+  if (!leaves_limbs_open(&small->hint) || !orb_trials_bend_much(small)) {
     return ORB_OK;
   }
   ORB_TRY(orb_trials_branch(small));
@@ -210,9 +211,30 @@ static orb_status improve_trials(orb_trials *small, int are_unlike) {
   return orb_trials_mirror(small);
 }
 
-/* Makes trials of small copies, raises the best of them, and ranks these. Small copies have too few vertices for thin
- * limbs: bodies in poses, which bend little, get the trials of coarse copies too. */
-static orb_status fill_trials(orb_trials *t, int are_unlike) {
+/* Adds the trials of coarse copies to those that were raised, and ranks all. */
+static orb_status rank_with_coarse(orb_trials *t) {
+  ORB_TRY(orb_trials_make(t));
+  return orb_trials_rank(t);
+}
+
+/* Do raised trials bend the coarse copies so little that they are of one body in two poses? */
+static int are_of_one_body(const orb_trials *t) {
+  return t->count > 0 && t->trial[orb_trials_best(t)].cost < INFINITY && orb_trials_bend(t) <= ORB_FIND_COARSE_BEND;
+}
+
+/* Ranks the raised trials. Small copies have too few vertices for thin limbs: bodies in poses, which bend little, get
+ * the trials of coarse copies too. bends_little: the small ones do. Without raised trials, landmarks contradict all
+ * trials of small copies. */
+static orb_status rank_raised(orb_trials *t, int bends_little) {
+  if (bends_little || t->count == 0) {
+    return rank_with_coarse(t);
+  }
+  ORB_TRY(orb_trials_rank(t));
+  return are_of_one_body(t) ? rank_with_coarse(t) : ORB_OK;
+}
+
+/* Makes trials of small copies, raises the best of them, and ranks these. */
+static orb_status fill_trials(orb_trials *t) {
   orb_status status = ORB_E_NO_MEMORY;
   orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
   if (!small) {
@@ -223,12 +245,9 @@ static orb_status fill_trials(orb_trials *t, int are_unlike) {
   ORB_GO(status, orb_trials_make(small), end);
   ORB_GO(status, orb_trials_rank(small), end);
   const int bends_little = orb_trials_bend(small) <= ORB_FIND_COARSE_TOO;
-  ORB_GO(status, improve_trials(small, are_unlike), end);
+  ORB_GO(status, improve_trials(small), end);
   ORB_GO(status, orb_trials_raise(small, t), end);
-  if (bends_little || t->count == 0) { /* 0: landmarks contradict all trials of small copies */
-    ORB_GO(status, orb_trials_make(t), end);
-  }
-  ORB_GO(status, orb_trials_rank(t), end);
+  ORB_GO(status, rank_raised(t, bends_little), end);
   if (t->hint.count == 0) { /* landmarks draw the best trial along its map, which crossing does not change */
     ORB_GO(status, orb_trials_cross(t), end);
   }
@@ -274,7 +293,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     return ORB_OK;
   }
   if (t->count == 0) {
-    ORB_TRY(fill_trials(t, out->is_unlike));
+    ORB_TRY(fill_trials(t));
   }
   int32_t best = orb_trials_best(t);
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
