@@ -67,6 +67,7 @@ static const pair plans[] = {
     PLAN_PAIRS("spider", "creep", "rear", "curl"), PLAN_PAIRS("beetle", "creep", "rear", "curl"),
     PLAN_PAIRS("hand", "grip", "splay", "point"),  PLAN_PAIRS("bird", "fly", "glide", "perch"),
     PLAN_PAIRS("lizard", "bend", "crawl", "walk"), PLAN_PAIRS("fish", "swim", "dart", "turn"),
+    PLAN_PAIRS("centaur", "run", "rear", "turn"),
 };
 
 static FILE *open_file(const char *folder, const char *name, const char *ending) {

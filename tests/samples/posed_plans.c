@@ -173,15 +173,54 @@ static const orb_primitive fish_primitives[] = {
 static const posed_bone fish_bones[] = {{TORSO, -1}, {TORSO, 0},  {SNOUT, 0},  {TAIL, 1},   {LIMB_A, 3}, {LIMB_B, 3},
                                         {LIMB_C, 0}, {LIMB_C, 6}, {LIMB_D, 0}, {LIMB_D, 8}, {LIMB_E, 0}, {LIMB_E, 10}};
 
+static const orb_primitive centaur_primitives[] = {
+    PART(0, -0.55, 1.00, 0.00, 0.240, 0.00, 0.98, 0.00, 0.230), /* torso */
+    CONE(0.20, 0.00, 0.98, 0.00, 0.230, 0.36, 1.02, 0.00, 0.240),
+    CONE(0.15, 0.44, 1.22, 0.00, 0.200, 0.48, 1.50, 0.00, 0.190),
+    CONE(0.12, 0.48, 1.54, 0.00, 0.190, 0.49, 1.74, 0.00, 0.200),
+    CONE(0.08, 0.50, 1.92, 0.00, 0.085, 0.51, 2.00, 0.00, 0.085),
+    CONE(0.06, 0.53, 2.14, 0.00, 0.155, 0.56, 2.16, 0.00, 0.145),
+    PART(0.07, 0.48, 1.74, 0.22, 0.095, 0.46, 1.60, 0.56, 0.075), /* right arm */
+    CONE(0.05, 0.46, 1.60, 0.56, 0.075, 0.58, 1.46, 0.84, 0.060),
+    CONE(0.05, 0.58, 1.46, 0.84, 0.060, 0.66, 1.42, 0.98, 0.055),
+    PART(0.07, 0.48, 1.74, -0.22, 0.095, 0.46, 1.60, -0.56, 0.075), /* left arm */
+    CONE(0.05, 0.46, 1.60, -0.56, 0.075, 0.58, 1.46, -0.84, 0.060),
+    CONE(0.05, 0.58, 1.46, -0.84, 0.060, 0.66, 1.42, -0.98, 0.055),
+    PART(0.10, 0.36, 0.90, 0.14, 0.130, 0.40, 0.54, 0.15, 0.078), /* right legs */
+    CONE(0.05, 0.40, 0.54, 0.15, 0.078, 0.40, 0.14, 0.15, 0.056),
+    CONE(0.04, 0.41, 0.09, 0.15, 0.068, 0.47, 0.06, 0.15, 0.068),
+    PART(0.12, -0.54, 0.92, 0.14, 0.180, -0.46, 0.60, 0.16, 0.100),
+    CONE(0.06, -0.46, 0.60, 0.16, 0.100, -0.62, 0.42, 0.16, 0.066),
+    CONE(0.05, -0.62, 0.42, 0.16, 0.066, -0.60, 0.12, 0.16, 0.055),
+    CONE(0.04, -0.59, 0.09, 0.16, 0.068, -0.53, 0.06, 0.16, 0.068),
+    PART(0.10, 0.36, 0.90, -0.14, 0.130, 0.40, 0.54, -0.15, 0.078), /* left legs */
+    CONE(0.05, 0.40, 0.54, -0.15, 0.078, 0.40, 0.14, -0.15, 0.056),
+    CONE(0.04, 0.41, 0.09, -0.15, 0.068, 0.47, 0.06, -0.15, 0.068),
+    PART(0.12, -0.54, 0.92, -0.14, 0.180, -0.46, 0.60, -0.16, 0.100),
+    CONE(0.06, -0.46, 0.60, -0.16, 0.100, -0.62, 0.42, -0.16, 0.066),
+    CONE(0.05, -0.62, 0.42, -0.16, 0.066, -0.60, 0.12, -0.16, 0.055),
+    CONE(0.04, -0.59, 0.09, -0.16, 0.068, -0.53, 0.06, -0.16, 0.068),
+    PART(0.06, -0.80, 1.08, 0.00, 0.060, -0.96, 0.94, 0.01, 0.058), /* tail */
+    CONE(0.06, -0.96, 0.94, 0.01, 0.058, -1.02, 0.68, 0.02, 0.062),
+    CONE(0.06, -1.02, 0.68, 0.02, 0.062, -1.04, 0.44, 0.02, 0.050),
+};
+static const posed_bone centaur_bones[] = {
+    {TORSO, -1}, {TORSO, 0},  {NECK, 1},   {NECK, 2},    {LIMB_NONE, 3}, {HEAD, 4}, {LIMB_A, 3}, {LIMB_A, 6},
+    {LIMB_A, 7}, {LIMB_E, 3}, {LIMB_E, 9}, {LIMB_E, 10}, {FRU, 1},       {FRL, 12}, {FRF, 13},   {HRU, 0},
+    {HRL, 15},   {HRC, 16},   {HRF, 17},   {FLU, 1},     {FLL, 19},      {FLF, 20}, {HLU, 0},    {HLL, 22},
+    {HLC, 23},   {HLF, 24},   {TAIL, 0},   {TAIL, 26},   {TAIL, 27}};
+
 static const orb_animal spider = {"spider", spider_primitives, COUNT(spider_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
 static const orb_animal beetle = {"beetle", beetle_primitives, COUNT(beetle_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
 static const orb_animal hand = {"hand", hand_primitives, COUNT(hand_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
 static const orb_animal bird = {"bird", bird_primitives, COUNT(bird_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
 static const orb_animal lizard = {"lizard", lizard_primitives, COUNT(lizard_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
 static const orb_animal fish = {"fish", fish_primitives, COUNT(fish_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
+static const orb_animal centaur = {"centaur", centaur_primitives, COUNT(centaur_primitives), NULL, 0,
+                                   {0, 0, 0}, {0, 0, 0}};
 
 const posed_kind posed_plans[] = {
-    {&spider, spider_bones}, {&beetle, beetle_bones}, {&hand, hand_bones},
-    {&bird, bird_bones},     {&lizard, lizard_bones}, {&fish, fish_bones},
+    {&spider, spider_bones}, {&beetle, beetle_bones}, {&hand, hand_bones},       {&bird, bird_bones},
+    {&lizard, lizard_bones}, {&fish, fish_bones},     {&centaur, centaur_bones},
 };
 const int posed_plan_count = COUNT(posed_plans);
