@@ -2,7 +2,7 @@
 """Measures maps against dense truth, and writes docs/bench-correspond.md.
 
     tests/bench/correspond.py [--bin build/bin] [--base DIR-OR-REVISION] [--set people,animals,real] [--half choose|report|all]
-                              [--seeds N,…] [--given 0,8] [--preset default] [--change none,swapped,turned,refined] [--changed-given 0] [--sample K] [--pairs A-B,…] [--jobs 1]
+                              [--seeds N,…] [--given 0,8] [--preset default] [--change none,swapped,turned,refined,noisy] [--changed-given 0] [--sample K] [--pairs A-B,…] [--jobs 1]
                               [--store DIR] [--fresh] [--out FILE.md] [--json FILE.json]
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
@@ -11,7 +11,7 @@ beetles, hands, birds, lizards and fish, `apes` 48 people with the proportions o
 that is only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
-shape swapped, the second one rotated and its vertices and triangles shuffled, its triangles cut into four.
+shape swapped, the second one rotated and its vertices and triangles shuffled, its triangles cut into four, its vertices moved at random.
 
 Every result is a file in the store, by version, pair and options: an interrupted run continues, and a finished one is
 printed again at once. --fresh measures again. The version is the hash of the program, so a new build has new results.
