@@ -437,6 +437,18 @@ static void landmarks_in_the_middle_leave_legs_open(void **state) {
   assert_true(error[1] <= 0.015);
 }
 
+/* On small copies the thin legs of a spider are drawn to other legs. The map is then so poor that the search is
+ * repeated on larger copies. Before, the error was 0.029 with this seed, as with one of 26. */
+static void thin_legs_are_searched_again(void **state) {
+  (void)state;
+  if (IS_SLOW) {
+    skip(); /* two searches take a minute, and other tests run the same code */
+  }
+  double error[2];
+  (void)errors_of_seed((named_body[2]){{"spider", "", "curl"}, {"spider", "", "rear"}}, 29, FEW, error);
+  assert_true(error[0] <= 0.015);
+}
+
 /* One body is twisted. A match that exchanges left with right and front with back would move places by half a body. */
 static void a_twist_is_matched(void **state) {
   (void)state;
@@ -515,6 +527,7 @@ int main(void) {
                                      cmocka_unit_test(other_kinds_are_no_parts),
                                      cmocka_unit_test(one_landmark_keeps_the_match),
                                      cmocka_unit_test(landmarks_in_the_middle_leave_legs_open),
+                                     cmocka_unit_test(thin_legs_are_searched_again),
                                      cmocka_unit_test(a_twist_is_matched),
                                      cmocka_unit_test(finer_triangles_are_as_sure),
                                      cmocka_unit_test(distances_tell_a_pose)};

@@ -316,11 +316,25 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   return orb_trials_refine(t, walks && out->bend > out->walks_above ? ORB_FIND_FINE_BENT : ORB_FIND_FINE);
 }
 
-orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
-                          int walks, orb_match *out) {
+static orb_status find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
+                       int walks, int32_t small_size, orb_match *out) {
   memset(out, 0, sizeof *out);
   out->trials = ORB_NEW0(ctx, orb_trials, 1);
-  return out->trials ? run(ctx, first, second, hint, walks, out) : ORB_E_NO_MEMORY;
+  if (!out->trials) {
+    return ORB_E_NO_MEMORY;
+  }
+  out->trials->small_size = small_size;
+  return run(ctx, first, second, hint, walks, out);
+}
+
+orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
+                          int walks, orb_match *out) {
+  return find(ctx, first, second, hint, walks, ORB_FIND_SMALL, out);
+}
+
+orb_status orb_match_find_again(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, int32_t number,
+                                int walks, orb_match *out) {
+  return find(ctx, first, second, NULL, walks, ORB_FIND_SMALL + number * ORB_FIND_SMALL_AGAIN, out);
 }
 
 orb_status orb_match_target(orb_context *ctx, const orb_match *match, int32_t n, int moving, double **target) {

@@ -95,6 +95,10 @@ typedef struct orb_match {
  * all threads, and the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, int walks, orb_match *out);
+/* A further search without landmarks, number 1 and so on, from small copies of more vertices: another draw where those
+ * before have led to a poor map. */
+ORB_MUST_CHECK orb_status orb_match_find_again(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
+                                               int32_t number, int walks, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
  * other[n − 1]. moving: 0, the first shape, or 1, the second. Landmarks draw it to their partners. *target: the
  * caller's to free, also on failure; NULL if a degenerate shape cannot be registered back, which the best map excludes.

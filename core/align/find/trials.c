@@ -52,7 +52,7 @@ orb_status orb_trials_open(orb_context *ctx, const orb_mesh *first, const orb_me
 static orb_status make_small(orb_context *ctx, void *arg, int32_t s) {
   orb_trials *t = arg;
   t->scaling[s] = (orb_trial_scaling){.scale = 1}; /* a coarse copy is scaled already */
-  return make_copy(ctx, t, s, ORB_FIND_SMALL, &t->copy[s]);
+  return make_copy(ctx, t, s, t->small_size > 0 ? t->small_size : ORB_FIND_SMALL, &t->copy[s]);
 }
 
 /* The landmarks of the coarse copies, on the small ones. */
@@ -75,6 +75,7 @@ orb_status orb_trials_open_small(const orb_trials *coarse, orb_trials *small) {
   small->ctx = coarse->ctx;
   small->mesh[0] = &coarse->copy[0].mesh;
   small->mesh[1] = &coarse->copy[1].mesh;
+  small->small_size = coarse->small_size;
   ORB_TRY(orb_tasks_run(small->ctx, 2, make_small, small));
   return coarse->hint.count > 0 ? copy_hint(coarse, small) : ORB_OK;
 }

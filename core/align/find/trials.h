@@ -50,6 +50,7 @@ typedef struct orb_trials {
   orb_coarse_copy fine[2];        /* the same with more vertices, on which matches are settled; empty before
                                      orb_trials_refine() */
   int32_t fine_size;              /* vertices of these */
+  int32_t small_size;             /* vertices of small copies; 0: ORB_FIND_SMALL */
   orb_hint_places hint;           /* on the copies; the caller's to fill before orb_trials_rank(); empty: none */
   orb_spectral_dense dense;       /* the spectral maps */
   int32_t *rotated[2];            /* the maps of the rotations, one after the other, laid out as in `dense` */
