@@ -7,7 +7,7 @@
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
 docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed, `parts` 81 heads and busts, `plans` spiders,
-beetles, hands, birds, lizards and fish, `apes` 48 people with the proportions of an ape and other people. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half
+beetles, hands, birds, lizards, fish and centaurs, `apes` 48 people with the proportions of an ape and other people. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half
 that is only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
