@@ -294,7 +294,7 @@ static orb_status find_again(orb_context *ctx, const orb_align_shape *shapes, co
 }
 
 /* Searches again where limbs have gone astray, and takes the better map and its match. Registrations of thin limbs are
- * a lottery on small copies: of 28 pairs of spiders, whose eight legs lie beside each other, two came to 2.5 and 3.4.
+ * a lottery on small copies: of 28 pairs of spiders, whose eight legs lie beside each other, three came to 2.5 to 3.4.
  */
 static orb_status search_again(orb_context *ctx, const orb_align_shape *shapes, const orb_align_options *options,
                                matches *m, orb_alignment *alignment) {
