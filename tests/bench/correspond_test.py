@@ -102,7 +102,7 @@ class Correspond(unittest.TestCase):
 
     def test_changes_keep_places(self):
         first, second = self.surfaces
-        for name in correspond_changes.CHANGES:
+        for name in ("turned", "refined"):
             a, b, places = correspond_changes.change(name, first, second, self.places, second.file.parent)
             self.assertIs(a, first)
             self.assertAlmostEqual(b.area / second.area, 1, 5)
@@ -114,6 +114,15 @@ class Correspond(unittest.TestCase):
         self.assertEqual(len(b.triangles), 4 * len(second.triangles))
         a, b, places = correspond_changes.change("swapped", first, second, self.places, None)
         self.assertEqual((a, b, places[3][:2]), (second, first, self.places[3][1::-1]))
+
+    def test_noise_moves_vertices_by_a_fifth_of_an_edge(self):
+        first, second = self.surfaces
+        _, noisy, places = correspond_changes.change("noisy", first, second, self.places, second.file.parent)
+        edges = [math.dist(*(second.positions[t[i]] for i in (k, k - 1))) for t in second.triangles for k in range(3)]
+        moved = [x - y for p, q in zip(noisy.positions, second.positions) for x, y in zip(p, q)]
+        self.assertAlmostEqual(statistics.pstdev(moved) / statistics.mean(edges), correspond_changes.NOISE, 2)
+        self.assertEqual(noisy.triangles, second.triangles)
+        self.assertEqual(places, self.places)
 
     def test_images_follow_from_four_distances(self):
         points = [self.surfaces[0].position(place[0]) for place in self.places[:80]]
