@@ -59,7 +59,7 @@ NOISE = 0.2  # standard deviation along each axis, in mean edges: as rough as a 
 
 def noisy(surface, draw):
     """The surface with its vertices moved at random."""
-    edges = [math.dist(surface.positions[a], surface.positions[b]) for t in surface.triangles for a, b in zip(t, t[1:])]
+    edges = [math.dist(surface.positions[a], surface.positions[b]) for t in surface.triangles for a, b in zip(t, t[1:] + t[:1])]
     off = NOISE * sum(edges) / len(edges)
     return [tuple(draw.gauss(x, off) for x in p) for p in surface.positions], surface.triangles, lambda place: place
 

@@ -1,7 +1,8 @@
 /* Writes posed bodies with true correspondences into a folder.
  *
- *   orbmorph-posed DIR          writes samples.csv, and the tables of pairs: pairs.csv of animals and plans.csv of
- * kinds of other plans orbmorph-posed DIR BODY...  writes BODY.obj and BODY.truth.csv
+ *   orbmorph-posed DIR          writes samples.csv, pairs.csv (animals) and plans.csv (other plans)
+ *
+ *   orbmorph-posed DIR BODY...  writes BODY.obj and BODY.truth.csv
  *
  * A body is KIND-POSE or KIND-VARIANT-POSE. Its vertices and triangles are shuffled; some bodies are turned, and some
  * have other units. All that follows from the name: the files are the same on each run.

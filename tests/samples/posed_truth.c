@@ -72,7 +72,8 @@ static void add_rays(const ray *list, size_t size) {
   ray_count += (int)(size / sizeof *list);
 }
 
-/* Rays of other plans come last: then the places that are measured on animals do not depend on them. */
+/* Rays of other plans come after the first rays and after all others: then the places that are measured on animals do
+ * not depend on them. */
 static void list_rays(void) {
   if (ray_count)
     return;

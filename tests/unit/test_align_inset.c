@@ -422,7 +422,8 @@ static int64_t search_rationed(scene *s, int64_t at, orb_status *status) {
   return ration.calls - before;
 }
 
-/* Each allocation of the search fails once: that is reported, and nothing is left behind. */
+/* Each allocation of the search fails once, with sanitizers each third: that is reported, and nothing is left behind.
+ */
 static void memory_runs_out(void **state) {
   (void)state;
   scene s = {.mesh = {shape_of(0, 3, 1), shape_of(1, 4, 1)}};

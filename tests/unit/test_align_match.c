@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "align/find/match.h"
+#include "align/find/trials.h"
 #include "base/memory.h"
 #include "support_align.h"
 #include "support_shapes.h"
@@ -81,6 +82,24 @@ static void limbs_go_to_limbs(void **state) {
     shape_free(ctx, &mesh[1]);
     orb_context_destroy(ctx);
   }
+}
+
+/* A further search begins on other small copies, and takes limbs to their limbs too. */
+static void further_search_is_another_draw(void **state) {
+  (void)state;
+  static const double other[LIMBS] = {3.4, 4, 2.5, 2.9, 2.4};
+  orb_context *ctx;
+  orb_match match;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh mesh[2] = {creature_of(ctx, reach, 3, 0), creature_of(ctx, other, 4, 2)};
+  assert_int_equal(orb_match_find_again(ctx, &mesh[0], &mesh[1], 1, 1, &match), ORB_OK);
+  assert_true(match.is_found);
+  assert_int_equal(match.trials->small_size, ORB_FIND_SMALL + ORB_FIND_SMALL_AGAIN);
+  assert_limbs(ctx, &match, mesh, 1, 2);
+  orb_match_free(ctx, &match);
+  shape_free(ctx, &mesh[0]);
+  shape_free(ctx, &mesh[1]);
+  orb_context_destroy(ctx);
 }
 
 /* The shape with long limbs moves, whichever of two comes first; of two that are alike, the second. */
@@ -309,11 +328,15 @@ static void cow_to_animal(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(limbs_go_to_limbs),      cmocka_unit_test(less_round_shape_moves),
-      cmocka_unit_test(others_differ),          cmocka_unit_test(another_map_is_chosen),
-      cmocka_unit_test(confidence_is_monotone), cmocka_unit_test(symmetric_shapes_are_not_sure),
-      cmocka_unit_test(a_tie_is_shared),        cmocka_unit_test(man_to_armadillo),
-      cmocka_unit_test(cow_to_animal)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs),
+                                     cmocka_unit_test(further_search_is_another_draw),
+                                     cmocka_unit_test(less_round_shape_moves),
+                                     cmocka_unit_test(others_differ),
+                                     cmocka_unit_test(another_map_is_chosen),
+                                     cmocka_unit_test(confidence_is_monotone),
+                                     cmocka_unit_test(symmetric_shapes_are_not_sure),
+                                     cmocka_unit_test(a_tie_is_shared),
+                                     cmocka_unit_test(man_to_armadillo),
+                                     cmocka_unit_test(cow_to_animal)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -438,11 +438,11 @@ static void landmarks_in_the_middle_leave_legs_open(void **state) {
 }
 
 /* On small copies the thin legs of a spider are drawn to other legs. The map is then so poor that the search is
- * repeated on larger copies. Before, the error was 0.029 with this seed, as with one of 26. */
+ * repeated on larger copies. Before, the error was 0.029 with this seed, the only one of 26. */
 static void thin_legs_are_searched_again(void **state) {
   (void)state;
   if (IS_SLOW) {
-    skip(); /* two searches take a minute, and other tests run the same code */
+    skip(); /* it takes minutes; test_align_match.c repeats a search */
   }
   double error[2];
   (void)errors_of_seed((named_body[2]){{"spider", "", "curl"}, {"spider", "", "rear"}}, 29, FEW, error);

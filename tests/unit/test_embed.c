@@ -221,9 +221,9 @@ static void cancel_now(void *user, const char *stage, double fraction) {
   }
 }
 
-/* Two poles of valence 20,000, cancelled at every seventh reported step, in all stages. The bound on the remaining work
- * is processor time, so a busy machine does not matter. The documented limit is 100 ms; the bound here is one second,
- * for the sanitizers. */
+/* Two poles of valence 20,000, with sanitizers 5,000, cancelled at every seventh reported step, in all stages. The
+ * bound on the remaining work is processor time, so a busy machine does not matter. The documented limit is 100 ms; the
+ * bound here is one second, for the sanitizers. */
 static void test_cancel_everywhere(void **unused) {
   (void)unused;
   orb_context *plain = open_context(1);

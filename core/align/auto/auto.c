@@ -4,9 +4,10 @@
  * (find/match.c), and the composed map goes to the targets of its match. If one of two shapes is a part of the other
  * one, what lies on each other in space is held instead (find/inset/inset.h). Two shapes that bend much hold a contest
  * of the ways to make the map instead (find/contest.h). If the targets give no good map of two shapes, the next best
- * match is tried. If they give none of more shapes, pairs of the matches are pinned as landmarks, and the map is
- * composed with the pairs held and then without them. The alignment of least energy is returned. The preset `fast` only
- * searches for rotations of the given spheres.
+ * match is tried. If two shapes match with little bend and their map is poor all the same, limbs have gone astray, and
+ * the match is searched again from other small copies. If the targets give no good map of more shapes, pairs of the
+ * matches are pinned as landmarks, and the map is composed with the pairs held and then without them. The alignment of
+ * least energy is returned. The preset `fast` only searches for rotations of the given spheres.
  */
 #include <math.h>
 #include <string.h>
@@ -270,21 +271,21 @@ static int has_gone_astray(const matches *m, double energy) {
          energy > ORB_FIND_AGAIN_ABOVE;
 }
 
-/* The match of least cost of all further searches. *costs_less 0: none costs less than the one that has gone astray,
+/* The match of least cost of all further searches. *is_less 0: none costs less than the one that has gone astray,
  * and `out` is empty. */
 static orb_status find_again(orb_context *ctx, const orb_align_shape *shapes, const matches *astray, matches *out,
-                             int *costs_less) {
-  double least = astray->of[1].cost;
+                             int *is_less) {
+  double least = astray->bend;
   *out = (matches){.clear = 1};
-  *costs_less = 0;
+  *is_less = 0;
   for (int32_t i = 1; i <= ORB_FIND_AGAIN; i++) {
     matches one;
     const orb_status status = find_matches(ctx, shapes, 2, astray->keep_angles, i, &one);
-    if (status == ORB_OK && one.are_found && one.of[1].cost < least) {
+    if (status == ORB_OK && one.are_found && one.bend < least) {
       const matches worse = *out;
-      least = one.of[1].cost;
+      least = one.bend;
       *out = one;
-      *costs_less = 1;
+      *is_less = 1;
       one = worse;
     }
     matches_free(ctx, &one);
@@ -294,24 +295,25 @@ static orb_status find_again(orb_context *ctx, const orb_align_shape *shapes, co
 }
 
 /* Searches again where limbs have gone astray, and takes the better map and its match. Registrations of thin limbs are
- * a lottery on small copies: of 28 pairs of spiders, whose eight legs lie beside each other, three came to 2.5 to 3.4.
+ * a lottery on small copies: of 28 pairs of spiders in two poses, whose eight legs lie beside each other, three had
+ * an energy of 2.5 to 3.4.
  */
 static orb_status search_again(orb_context *ctx, const orb_align_shape *shapes, const orb_align_options *options,
                                matches *m, orb_alignment *alignment) {
   matches again = {.clear = 1};
   orb_alignment other = {0};
   orb_status status = ORB_OK;
-  int costs_less = 0;
+  int is_less = 0;
   if (!has_gone_astray(m, alignment->energy)) {
     return ORB_OK;
   }
-  ORB_GO(status, find_again(ctx, shapes, m, &again, &costs_less), end);
-  if (!costs_less) {
+  ORB_GO(status, find_again(ctx, shapes, m, &again, &is_less), end);
+  if (!is_less) {
     goto end;
   }
   ORB_GO(status, rotate_spheres(ctx, shapes, 2, options, &other), end);
   ORB_GO(status, follow_matches(ctx, shapes, &again, options, &other), end);
-  if (other.energy < alignment->energy) {
+  if (other.energy < alignment->energy && !again.is_part) { /* no energy compares a part with its whole */
     const matches worse_match = *m;
     const orb_alignment worse = *alignment;
     *m = again;

@@ -32,8 +32,8 @@
  *
  * All maps are tried on small copies, where a registration takes 3 ms; where shapes bend much, those of branches are
  * added and all are extended there, those near the best are crossed, and the best are mirrored. The best few are
- * registered again on copies three times as fine, and ranked. Bodies in poses, which bend little, get maps made on
- * these finer copies as well.
+ * registered again on copies three times as fine, and ranked. Bodies in poses, which bend the small or the finer copies
+ * little, get maps made on the finer ones as well.
  *
  * Rejected: ranking all candidates by the energy of their composed maps on the coarse copies. That energy depends on
  * the course of a walk: one right map had 4.05, and 1.37 with its tips shifted a little. Right and wrong maps differ by
@@ -96,7 +96,7 @@ typedef struct orb_match {
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, int walks, orb_match *out);
 /* A further search without landmarks, number 1 and so on, from small copies of more vertices: another draw where those
- * before have led to a poor map. */
+ * before have led to a poor map. Otherwise it is orb_match_find() without a hint. */
 ORB_MUST_CHECK orb_status orb_match_find_again(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                                int32_t number, int walks, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by

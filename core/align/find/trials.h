@@ -88,7 +88,8 @@ ORB_MUST_CHECK orb_status orb_trial_create(orb_context *ctx, const orb_trials *t
 /* Drops the trials whose rough maps take the landmarks far away, registers the others in one direction, drops those
  * that are too far behind to win, and registers the others in the other direction. Trials that take the landmarks
  * elsewhere are dropped after the first direction. If all do, they are dropped after the second one instead: arms that
- * lie against a body are registered to it in one direction, but correctly in the other. */
+ * lie against a body are registered to it in one direction, but correctly in the other. May be called again after
+ * trials were added: dropped ones stay dropped, and the others are registered again. */
 ORB_MUST_CHECK orb_status orb_trials_rank(orb_trials *trials);
 
 /* The number of the trial of least cost. */
