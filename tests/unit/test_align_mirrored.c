@@ -247,11 +247,11 @@ static int64_t search_rationed(scene *s, int64_t at, orb_status *status) {
   return ration.calls;
 }
 
-/* An allocation fails somewhere: that is reported, and nothing is left behind. Every 1499th of the calls, with
- * sanitizers every 2999th, since there are thousands. */
+/* An allocation fails somewhere: that is reported, and nothing is left behind. Every 1499th of the calls, since there
+ * are thousands. */
 static void memory_runs_out(void **state) {
   (void)state;
-  enum { STEP = IS_SLOW ? 2999 : 1499 };
+  enum { STEP = 1499 };
   scene s;
   orb_status status;
   stretched_open(&s);
