@@ -185,12 +185,6 @@ static const posed_bone bust_bones[] = {{NECK, -1},     {FACE, 0},      {FACE, 1
                                         {FACE, 1},      {EAR_R, 1},     {EAR_L, 1},    {LIMB_NONE, -1},
                                         {LIMB_NONE, 7}, {LIMB_NONE, 8}, {LIMB_NONE, 8}};
 
-#define ANIMAL(kind)                                                           \
-  {                                                                            \
-#kind, kind##_primitives, COUNT(kind##_primitives), NULL, 0, {0, 0, 0 }, { \
-      0, 0, 0                                                                  \
-    }                                                                          \
-  }
 static const orb_animal horse = ANIMAL(horse), cow = ANIMAL(cow), cat = ANIMAL(cat), person = ANIMAL(person),
                         head = ANIMAL(head), bust = ANIMAL(bust);
 

@@ -210,14 +210,8 @@ static const posed_bone centaur_bones[] = {
     {HRL, 15},   {HRC, 16},   {HRF, 17},   {FLU, 1},     {FLL, 19},      {FLF, 20}, {HLU, 0},    {HLL, 22},
     {HLC, 23},   {HLF, 24},   {TAIL, 0},   {TAIL, 26},   {TAIL, 27}};
 
-static const orb_animal spider = {"spider", spider_primitives, COUNT(spider_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
-static const orb_animal beetle = {"beetle", beetle_primitives, COUNT(beetle_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
-static const orb_animal hand = {"hand", hand_primitives, COUNT(hand_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
-static const orb_animal bird = {"bird", bird_primitives, COUNT(bird_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
-static const orb_animal lizard = {"lizard", lizard_primitives, COUNT(lizard_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
-static const orb_animal fish = {"fish", fish_primitives, COUNT(fish_primitives), NULL, 0, {0, 0, 0}, {0, 0, 0}};
-static const orb_animal centaur = {"centaur", centaur_primitives, COUNT(centaur_primitives), NULL, 0,
-                                   {0, 0, 0}, {0, 0, 0}};
+static const orb_animal spider = ANIMAL(spider), beetle = ANIMAL(beetle), hand = ANIMAL(hand), bird = ANIMAL(bird),
+                        lizard = ANIMAL(lizard), fish = ANIMAL(fish), centaur = ANIMAL(centaur);
 
 const posed_kind posed_plans[] = {
     {&spider, spider_bones}, {&beetle, beetle_bones}, {&hand, hand_bones},       {&bird, bird_bones},

@@ -133,8 +133,8 @@ static int bone_at(const posed_rest *rest, posed_limb limb, double at, double *s
   return last;
 }
 
-/* Three axes of a bone: right, back or down, along. The first axis of an ear, or of an
- * appendage of another plan, is forward, since these point to the side. */
+/* Three axes of a bone: right, back or down, along. The first axis of an ear, or of an appendage of another
+ * plan, is forward, since these point to the side. */
 static void frame_of(const orb_primitive *o, posed_limb limb, double frame[3][3]) {
   static const double face[3][3] = {{0, 0, 1}, {0, -1, 0}, {1, 0, 0}};
   if (limb == FACE) {

@@ -33,4 +33,12 @@
     }                                                       \
   }
 
+/* An animal of the primitives kind_primitives, without features, whose box is still to be set. */
+#define ANIMAL(kind)                                                           \
+  {                                                                            \
+#kind, kind##_primitives, COUNT(kind##_primitives), NULL, 0, {0, 0, 0 }, { \
+      0, 0, 0                                                                  \
+    }                                                                          \
+  }
+
 #endif

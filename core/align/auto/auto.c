@@ -80,9 +80,7 @@ static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, 
     return ORB_E_NO_MEMORY;
   }
   for (int32_t s = 1; s < shape_count; s++) {
-    const orb_mesh *first = shapes[0].mesh, *second = shapes[s].mesh;
-    ORB_TRY(number > 0 ? orb_match_find_again(ctx, first, second, number, shape_count == 2, &m->of[s])
-                       : orb_match_find(ctx, first, second, NULL, shape_count == 2, &m->of[s]));
+    ORB_TRY(orb_match_find_again(ctx, shapes[0].mesh, shapes[s].mesh, number, shape_count == 2, &m->of[s]));
     m->are_found = m->are_found && m->of[s].is_found;
     m->clear = fmin(m->clear, m->of[s].clear);
     m->lead = fmin(m->lead, m->of[s].lead);
@@ -271,13 +269,11 @@ static int has_gone_astray(const matches *m, double energy) {
          energy > ORB_FIND_AGAIN_ABOVE;
 }
 
-/* The match of least cost of all further searches. *is_less 0: none costs less than the one that has gone astray,
- * and `out` is empty. */
-static orb_status find_again(orb_context *ctx, const orb_align_shape *shapes, const matches *astray, matches *out,
-                             int *is_less) {
+/* The match that bends least of all further searches; costs do not compare, since only some searches weigh symmetries.
+ * None is found, and `out` is empty, if none bends less than the one that has gone astray. */
+static orb_status find_again(orb_context *ctx, const orb_align_shape *shapes, const matches *astray, matches *out) {
   double least = astray->bend;
   *out = (matches){.clear = 1};
-  *is_less = 0;
   for (int32_t i = 1; i <= ORB_FIND_AGAIN; i++) {
     matches one;
     const orb_status status = find_matches(ctx, shapes, 2, astray->keep_angles, i, &one);
@@ -285,7 +281,6 @@ static orb_status find_again(orb_context *ctx, const orb_align_shape *shapes, co
       const matches worse = *out;
       least = one.bend;
       *out = one;
-      *is_less = 1;
       one = worse;
     }
     matches_free(ctx, &one);
@@ -296,19 +291,17 @@ static orb_status find_again(orb_context *ctx, const orb_align_shape *shapes, co
 
 /* Searches again where limbs have gone astray, and takes the better map and its match. Registrations of thin limbs are
  * a lottery on small copies: of 28 pairs of spiders in two poses, whose eight legs lie beside each other, three had
- * an energy of 2.5 to 3.4.
- */
+ * an energy of 2.5 to 3.4. */
 static orb_status search_again(orb_context *ctx, const orb_align_shape *shapes, const orb_align_options *options,
                                matches *m, orb_alignment *alignment) {
   matches again = {.clear = 1};
   orb_alignment other = {0};
   orb_status status = ORB_OK;
-  int is_less = 0;
   if (!has_gone_astray(m, alignment->energy)) {
     return ORB_OK;
   }
-  ORB_GO(status, find_again(ctx, shapes, m, &again, &is_less), end);
-  if (!is_less) {
+  ORB_GO(status, find_again(ctx, shapes, m, &again), end);
+  if (!again.are_found) {
     goto end;
   }
   ORB_GO(status, rotate_spheres(ctx, shapes, 2, options, &other), end);

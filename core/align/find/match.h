@@ -95,8 +95,8 @@ typedef struct orb_match {
  * all threads, and the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          const orb_match_hint *hint, int walks, orb_match *out);
-/* A further search without landmarks, number 1 and so on, from small copies of more vertices: another draw where those
- * before have led to a poor map. Otherwise it is orb_match_find() without a hint. */
+/* orb_match_find() without a hint (number 0), or a further such search (1 and so on) from small copies of more
+ * vertices: another draw where those before have led to a poor map. */
 ORB_MUST_CHECK orb_status orb_match_find_again(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                                int32_t number, int walks, orb_match *out);
 /* Computes where each vertex of a shape lies on the other one, in its space, 3 per vertex: by the best map (n 0) or by
