@@ -14,6 +14,7 @@
 
 #include "base/check.h"
 #include "base/context.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -53,7 +54,7 @@ typedef struct stance {
 
 typedef struct body {
   const orb_mesh *mesh;
-  int32_t *piece; /* of each vertex: union-find */
+  int32_t *piece; /* of each vertex: a forest */
   double *area;   /* of each root */
   double *sum;    /* of each root: area × centroid */
   orb_nearest *tree;
@@ -71,13 +72,6 @@ static double measure(const orb_mesh *mesh, int32_t t, double centroid[3]) {
   return orb_triangle_area(p[0], p[1], p[2]);
 }
 
-static int32_t root(int32_t *piece, int32_t v) {
-  while (piece[v] != v) {
-    v = piece[v] = piece[piece[v]];
-  }
-  return v;
-}
-
 /* The connected pieces of the surface below a height: their roots get area and sum. */
 static void gather_pieces(body *b, int up, double below) {
   const orb_mesh *mesh = b->mesh;
@@ -93,9 +87,9 @@ static void gather_pieces(body *b, int up, double below) {
         continue;
       }
       for (int k = 1; pass == 0 && k < 3; k++) {
-        b->piece[root(b->piece, v[k])] = root(b->piece, v[0]);
+        orb_forest_join(b->piece, v[0], v[k]);
       }
-      size_t at = (size_t)root(b->piece, v[0]);
+      size_t at = (size_t)orb_forest_root(b->piece, v[0]);
       for (int c = 0; pass == 1 && c < 3; c++) {
         b->sum[3 * at + (size_t)c] += area * centroid[c];
       }

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 #include "orbmorph/transfer.h"
@@ -35,14 +36,6 @@ void orb_torn_close(const orb_mesh *repaired, const orb_supermesh *supermesh, do
   }
 }
 
-static int32_t root_of(int32_t *parent, int32_t v) {
-  while (parent[v] != v) {
-    parent[v] = parent[parent[v]];
-    v = parent[v];
-  }
-  return v;
-}
-
 /* Has a repair split a vertex, or covered what it opened? */
 static int has_torn(const orb_mesh *repaired) {
   int has = 0;
@@ -56,24 +49,22 @@ static int has_torn(const orb_mesh *repaired) {
 }
 
 /* Joins the vertices of each cover. covered: of each vertex, whether it is of one. */
-static void join_covers(const orb_mesh *repaired, const orb_supermesh *supermesh, int32_t *parent,
+static void join_covers(const orb_mesh *repaired, const orb_supermesh *supermesh, int32_t *forest,
                         unsigned char *covered) {
-  for (int32_t v = 0; v < supermesh->vertex_count; v++) {
-    parent[v] = v;
-  }
+  orb_forest_plant(forest, supermesh->vertex_count);
   for (int32_t t = 0; t < repaired->triangle_count && t < supermesh->triangle_count; t++) {
     const int32_t *v = supermesh->triangles + 3 * (size_t)t;
     if (repaired->source_triangle[t] == ORB_MADE_COVER) {
       for (int k = 0; k < 3; k++) {
         covered[v[k]] = 1;
-        parent[root_of(parent, v[k])] = root_of(parent, v[0]);
+        orb_forest_join(forest, v[0], v[k]);
       }
     }
   }
 }
 
 /* The widest box around a cover. box: room for 6 per vertex. */
-static double widest(const double *positions, int32_t count, int32_t *parent, const unsigned char *covered,
+static double widest(const double *positions, int32_t count, int32_t *forest, const unsigned char *covered,
                      double *box) {
   double most2 = 0;
   for (int32_t v = 0; v < count; v++) {
@@ -84,7 +75,7 @@ static double widest(const double *positions, int32_t count, int32_t *parent, co
   }
   for (int32_t v = 0; v < count; v++) {
     if (covered[v]) {
-      double *one = box + 6 * (size_t)root_of(parent, v), wide2 = 0;
+      double *one = box + 6 * (size_t)orb_forest_root(forest, v), wide2 = 0;
       for (int k = 0; k < 3; k++) {
         one[k] = fmin(one[k], positions[3 * (size_t)v + (size_t)k]);
         one[k + 3] = fmax(one[k + 3], positions[3 * (size_t)v + (size_t)k]);
@@ -103,11 +94,11 @@ orb_status orb_report_torn(orb_context *ctx, const orb_mesh *repaired, orb_merge
   const orb_supermesh *supermesh = &out->supermesh;
   const size_t n = (size_t)supermesh->vertex_count;
   double *positions = ORB_NEW(ctx, double, 3 * n), *box = ORB_NEW(ctx, double, 6 * n);
-  int32_t *parent = ORB_NEW(ctx, int32_t, n);
+  int32_t *forest = ORB_NEW(ctx, int32_t, n);
   unsigned char *covered = ORB_NEW0(ctx, unsigned char, n);
-  orb_status status = positions && box && parent && covered ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_status status = positions && box && forest && covered ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    join_covers(repaired, supermesh, parent, covered);
+    join_covers(repaired, supermesh, forest, covered);
   }
   for (int32_t s = 1; s < supermesh->shape_count && status == ORB_OK; s++) {
     double moved;
@@ -115,14 +106,14 @@ orb_status orb_report_torn(orb_context *ctx, const orb_mesh *repaired, orb_merge
            orb_transfer_positions(ctx, &out->alignment.shapes[s], supermesh->places + (size_t)s * n,
                                   supermesh->vertex_count, positions),
            done);
-    const double cover = widest(positions, supermesh->vertex_count, parent, covered, box);
+    const double cover = widest(positions, supermesh->vertex_count, forest, covered, box);
     orb_torn_close(repaired, supermesh, positions, &moved);
     out->shapes[s].hausdorff += moved + cover; /* NaN stays: nothing is proved */
   }
 done:
   orb_free(ctx, positions);
   orb_free(ctx, box);
-  orb_free(ctx, parent);
+  orb_free(ctx, forest);
   orb_free(ctx, covered);
   return status;
 }

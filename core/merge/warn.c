@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "base/context.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -18,7 +19,7 @@ typedef struct marking {
   double *area[2];       /* of each triangle */
   double whole[2];       /* of all triangles */
   unsigned char *marked; /* of each triangle */
-  int32_t *part;         /* of each vertex: union-find */
+  int32_t *part;         /* of each vertex: a forest */
   int32_t *number;       /* of each root: of its part */
 } marking;
 
@@ -70,13 +71,6 @@ static double share_on(const marking *m, int s, const double marked) {
   return m->whole[s] > 0 ? marked / m->whole[s] : 0;
 }
 
-static int32_t root(int32_t *part, int32_t v) {
-  while (part[v] != v) {
-    v = part[v] = part[part[v]];
-  }
-  return v;
-}
-
 static void join_parts(const marking *m) {
   for (int32_t v = 0; v < m->pair->vertex_count; v++) {
     m->part[v] = v;
@@ -85,8 +79,7 @@ static void join_parts(const marking *m) {
   for (int32_t t = 0; t < m->pair->triangle_count; t++) {
     const int32_t *v = m->pair->triangles + 3 * (size_t)t;
     for (int k = 1; m->marked[t] && k < 3; k++) {
-      int32_t a = root(m->part, v[0]), b = root(m->part, v[k]);
-      m->part[a > b ? a : b] = a < b ? a : b;
+      orb_forest_join(m->part, v[0], v[k]);
     }
   }
 }
@@ -96,7 +89,7 @@ static void choose_parts(const marking *m, double *share, orb_warning *out) {
   double sum[2] = {0, 0};
   for (int32_t t = 0; t < m->pair->triangle_count; t++) {
     for (int s = 0; m->marked[t] && s < 2; s++) {
-      share[2 * (size_t)root(m->part, m->pair->triangles[3 * (size_t)t]) + (size_t)s] += m->area[s][t];
+      share[2 * (size_t)orb_forest_root(m->part, m->pair->triangles[3 * (size_t)t]) + (size_t)s] += m->area[s][t];
       sum[s] += m->area[s][t];
     }
   }
@@ -125,7 +118,7 @@ static void enclose(const marking *m, int32_t number, int s, orb_warning_part *o
   double sum = 0;
   for (int pass = 0; pass < 2; pass++) {
     for (int32_t t = 0; t < m->pair->triangle_count; t++) {
-      if (!m->marked[t] || m->number[root(m->part, m->pair->triangles[3 * (size_t)t])] != number) {
+      if (!m->marked[t] || m->number[orb_forest_root(m->part, m->pair->triangles[3 * (size_t)t])] != number) {
         continue;
       }
       double weight = m->area[s][t] + 1e-12 * m->whole[s]; /* a part may have collapsed to nothing */
@@ -151,7 +144,7 @@ static void list_triangles(const marking *m, int32_t number, orb_warning_part *o
   double size[ORB_WARNING_TRIANGLES];
   for (int32_t t = 0; t < m->pair->triangle_count; t++) {
     const int32_t *v = m->pair->triangles + 3 * (size_t)t;
-    if (!m->marked[t] || m->number[root(m->part, v[0])] != number) {
+    if (!m->marked[t] || m->number[orb_forest_root(m->part, v[0])] != number) {
       continue;
     }
     double here = fmax(share_on(m, 0, m->area[0][t]), share_on(m, 1, m->area[1][t]));

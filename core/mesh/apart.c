@@ -8,25 +8,8 @@
 #include "mesh/apart.h"
 
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/memory.h"
-
-static int32_t root_of(int32_t *root, int32_t i) {
-  while (root[i] != i) {
-    root[i] = root[root[i]];
-    i = root[i];
-  }
-  return i;
-}
-
-/* Joins the sets of a and b. Returns 0 if they are one already. The lesser root stays, so the result does not depend on
- * the order.
- */
-static int join(int32_t *root, int32_t a, int32_t b) {
-  a = root_of(root, a);
-  b = root_of(root, b);
-  root[a < b ? b : a] = a < b ? a : b;
-  return a != b;
-}
 
 orb_status orb_cycles_apart(orb_surface *s, orb_cycles *cycles) {
   int32_t faces = s->mesh->triangle_count, regions = faces, kept = 0;
@@ -40,17 +23,15 @@ orb_status orb_cycles_apart(orb_surface *s, orb_cycles *cycles) {
       on[h] = on[s->twin[h]] = 1;
     }
   }
-  for (int32_t t = 0; t < faces && status == ORB_OK; t++) {
-    root[t] = t;
-  }
+  orb_forest_plant(root, status == ORB_OK ? faces : 0);
   for (int32_t h = 0; h < 3 * faces && status == ORB_OK; h++) {
     if (h < s->twin[h] && !on[h]) {
-      regions -= join(root, h / 3, s->twin[h] / 3);
+      regions -= orb_forest_join(root, h / 3, s->twin[h] / 3);
     }
   }
   for (int32_t i = cycles->count; i-- > 0 && status == ORB_OK;) {
     int32_t h = cycles->half_edges[cycles->cycle[i].start];
-    drop[i] = (unsigned char)join(root, h / 3, s->twin[h] / 3);
+    drop[i] = (unsigned char)orb_forest_join(root, h / 3, s->twin[h] / 3);
     regions -= drop[i];
   }
   for (int32_t i = 0; i < cycles->count && status == ORB_OK; i++) {

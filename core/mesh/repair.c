@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "mesh/edit.h"
 #include "mesh/fill.h"
@@ -71,14 +72,7 @@ static orb_status join_crowded(orb_surface *s, int32_t *root) {
     int32_t glow = triangles[g] < triangles[orb_next(g)] ? triangles[g] : triangles[orb_next(g)];
     int32_t hlow = triangles[h] < triangles[orb_next(h)] ? triangles[h] : triangles[orb_next(h)];
     if (glow == hlow && entry[i - 1] >> 32 == entry[i] >> 32) {
-      int32_t a = s->piece[g / 3], b = s->piece[h / 3];
-      while (root[a] != a) {
-        a = root[a] = root[root[a]];
-      }
-      while (root[b] != b) {
-        b = root[b] = root[root[b]];
-      }
-      root[a < b ? b : a] = a < b ? a : b;
+      orb_forest_join(root, s->piece[g / 3], s->piece[h / 3]);
     }
   }
   orb_free(s->ctx, entry);
@@ -95,19 +89,12 @@ static orb_status keep_piece(orb_surface *s, const orb_repair_options *options) 
   int32_t *root = ORB_NEW(s->ctx, int32_t, s->piece_count);
   orb_parts parts = {0};
   orb_status status = root ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int32_t i = 0; i < s->piece_count && status == ORB_OK; i++) {
-    root[i] = i;
-  }
+  orb_forest_plant(root, status == ORB_OK ? s->piece_count : 0);
   if (status == ORB_OK && s->edges.crowded > 0) {
     status = join_crowded(s, root);
   }
-  for (int32_t i = 0; i < s->piece_count && status == ORB_OK; i++) {
-    while (root[i] != root[root[i]]) {
-      root[i] = root[root[i]];
-    }
-  }
   for (int32_t t = 0; t < s->mesh->triangle_count && status == ORB_OK; t++) {
-    s->piece[t] = root[s->piece[t]];
+    s->piece[t] = orb_forest_root(root, s->piece[t]);
   }
   if (status == ORB_OK) {
     status = orb_parts_list(s, &parts);

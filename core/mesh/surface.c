@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "mesh/edit.h"
 
@@ -83,14 +84,6 @@ static int32_t corner_counter(const int32_t *twin, int32_t h) {
   return twin[h] < 0 ? twin[h] : orb_next(twin[h]);
 }
 
-static int32_t root_of(int32_t *root, int32_t i) {
-  while (root[i] != i) {
-    root[i] = root[root[i]];
-    i = root[i];
-  }
-  return i;
-}
-
 /* Marks the fan of corner h as seen; sets the vertex of its corners to `vertex` unless that is negative. */
 static void take_fan(orb_surface *s, int32_t h, int32_t vertex, unsigned char *seen) {
   int32_t *triangles = s->mesh->triangles;
@@ -117,11 +110,7 @@ static orb_status further_fan(orb_surface *s, int32_t h, int split, const int32_
                               unsigned char *seen, unsigned char *listed) {
   orb_mesh *mesh = s->mesh;
   int32_t v = mesh->triangles[h];
-  int32_t a = root_of(root, s->piece[h / 3]), b = root_of(root, s->piece[first[v] / 3]);
-  if (a != b) {
-    root[a < b ? b : a] = a < b ? a : b;
-    out->joins++;
-  }
+  out->joins += orb_forest_join(root, s->piece[h / 3], s->piece[first[v] / 3]);
   if (!listed[v]) {
     listed[v] = 1;
     out->pinched++;

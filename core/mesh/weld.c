@@ -10,6 +10,7 @@
 #include "mesh/weld.h"
 
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/hash.h"
 #include "base/memory.h"
 #include "mesh/edit.h"
@@ -22,27 +23,14 @@ typedef struct weld {
   orb_context *ctx;
   orb_mesh *mesh;
   int32_t *twin;
-  int32_t *root;  /* union-find over vertices, the lowest is the root */
+  int32_t *root;  /* forest of the vertices */
   int32_t *place; /* the lowest vertex on an open edge at the same position; −1: not on an open edge */
   unsigned char *flags;
   int64_t welded;
 } weld;
 
-static int32_t find_root(weld *w, int32_t v) {
-  while (w->root[v] != v) {
-    w->root[v] = w->root[w->root[v]];
-    v = w->root[v];
-  }
-  return v;
-}
-
 static void unite(weld *w, int32_t a, int32_t b) {
-  a = find_root(w, a);
-  b = find_root(w, b);
-  if (a != b) {
-    w->root[a < b ? b : a] = a < b ? a : b;
-    w->welded++;
-  }
+  w->welded += orb_forest_join(w->root, a, b);
 }
 
 static int32_t origin(const weld *w, int32_t h) {
@@ -110,7 +98,7 @@ static orb_status find_places(weld *w, int64_t *open_count) {
 /* Applies the unions and removes the collapsed faces. */
 static orb_status apply(weld *w, orb_edges *edges) {
   for (int32_t v = 0; v < w->mesh->vertex_count; v++) {
-    w->root[v] = find_root(w, v);
+    w->root[v] = orb_forest_root(w->root, v);
   }
   orb_mesh_apply_weld(w->mesh, w->root);
   if (orb_mesh_flag_degenerate(w->mesh, w->flags)) {

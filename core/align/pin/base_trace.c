@@ -5,6 +5,7 @@
 #include "align/pin/base_trace.h"
 #include "align/pin/path_tracer.h"
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -79,15 +80,7 @@ static int by_length(const void *a, const void *b) {
                                  : (x->half_edge > y->half_edge) - (x->half_edge < y->half_edge);
 }
 
-static int32_t root_of(int32_t *parent, int32_t v) {
-  while (parent[v] != v) {
-    parent[v] = parent[parent[v]];
-    v = parent[v];
-  }
-  return v;
-}
-
-static orb_status trace_all(base_tracer *t, candidate *order, int32_t *parent, int *good) {
+static orb_status trace_all(base_tracer *t, candidate *order, int32_t *forest, int *good) {
   const orb_mesh *mesh = &t->base->shape.mesh;
   int32_t edges = 0;
   for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
@@ -98,19 +91,17 @@ static orb_status trace_all(base_tracer *t, candidate *order, int32_t *parent, i
     }
   }
   qsort(order, (size_t)edges, sizeof *order, by_length);
+  orb_forest_plant(forest, mesh->vertex_count);
   for (int32_t v = 0; v < mesh->vertex_count; v++) {
-    parent[v] = v;
     t->on.paths->on[t->at[v]] = 1;
   }
   *good = 1;
   for (int tree = 1; tree >= 0; tree--) {
     for (int32_t i = 0; i < edges && *good; i++) {
-      int32_t b = order[i].half_edge, from = root_of(parent, mesh->triangles[b]),
-              to = root_of(parent, mesh->triangles[orb_next(b)]);
-      if (t->base_done[b] || (tree && from == to)) {
+      int32_t b = order[i].half_edge, from = mesh->triangles[b], to = mesh->triangles[orb_next(b)];
+      if (t->base_done[b] || (!orb_forest_join(forest, from, to) && tree)) {
         continue;
       }
-      parent[from] = to;
       ORB_TRY(trace_one(t, b, good));
     }
   }
@@ -123,18 +114,18 @@ orb_status orb_base_trace(orb_context *ctx, orb_sheet *sheet, const orb_sheet *b
   base_tracer t = {.on = {.ctx = ctx, .sheet = sheet, .paths = paths, .work = work}, .base = base, .at = at};
   t.most_triangles = most_triangles;
   candidate *order = ORB_NEW(ctx, candidate, 3 * (size_t)mesh->triangle_count);
-  int32_t *parent = ORB_NEW(ctx, int32_t, mesh->vertex_count);
+  int32_t *forest = ORB_NEW(ctx, int32_t, mesh->vertex_count);
   orb_status status = ORB_OK;
   t.base_done = ORB_NEW0(ctx, int32_t, 3 * (size_t)mesh->triangle_count);
-  if (!order || !parent || !t.base_done) {
+  if (!order || !forest || !t.base_done) {
     status = ORB_E_NO_MEMORY;
     goto end;
   }
   ORB_GO(status, orb_paths_fit(ctx, sheet, paths), end);
-  ORB_GO(status, trace_all(&t, order, parent, good), end);
+  ORB_GO(status, trace_all(&t, order, forest, good), end);
 end:
   orb_free(ctx, order);
-  orb_free(ctx, parent);
+  orb_free(ctx, forest);
   orb_free(ctx, t.base_done);
   orb_path_tracer_free(&t.on);
   return status;

@@ -15,6 +15,7 @@
 #include "align/pin/path_tracer.h"
 #include "base/check.h"
 #include "base/error.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -38,7 +39,7 @@ typedef struct joiner {
   int32_t *origin, *next, *prev; /* of each half-edge; next: counter-clockwise around the origin */
   int32_t *first;                /* of each landmark: one half-edge that leaves it, −1 */
   int32_t *face, faces;          /* of each half-edge: the face on its left */
-  int32_t *parent;               /* trees of the forest */
+  int32_t *forest;               /* of what edges join */
   int32_t edges;
   int64_t *work;
   double *least; /* shape-major, count × count: lower bounds of the lengths of paths */
@@ -90,14 +91,6 @@ static void queue_pop(queue *q) {
   if (q->count > 0) {
     sift(q, 0);
   }
-}
-
-static int32_t root_of(int32_t *parent, int32_t v) {
-  while (parent[v] != v) {
-    parent[v] = parent[parent[v]];
-    v = parent[v];
-  }
-  return v;
 }
 
 static int neighbours(const joiner *j, int32_t a, int32_t b) {
@@ -299,7 +292,8 @@ static orb_status short_enough(joiner *j, int32_t a, int32_t b, double most, int
 }
 
 static int is_open(joiner *j, int tree, int32_t a, int32_t b) {
-  return tree ? root_of(j->parent, a) != root_of(j->parent, b) : !neighbours(j, a, b) && share_face(j, a, b);
+  return tree ? orb_forest_root(j->forest, a) != orb_forest_root(j->forest, b)
+              : !neighbours(j, a, b) && share_face(j, a, b);
 }
 
 /* Adds edges in the order of their true lengths, which grow as paths get in their way: a pair that has become longer
@@ -324,7 +318,7 @@ static orb_status join_pass(joiner *j, queue *q, int tree, int *good) {
     }
     if (taken) {
       queue_pop(q);
-      j->parent[root_of(j->parent, a)] = root_of(j->parent, b);
+      orb_forest_join(j->forest, a, b);
       ORB_TRY(add_edge(j, a, b, good));
     }
   }
@@ -429,10 +423,10 @@ static orb_status joiner_create(joiner *j, orb_sheet *sheets, orb_paths *paths) 
   j->prev = block + 2 * half_edges;
   j->face = block + 3 * half_edges;
   j->first = block + 4 * half_edges;
-  j->parent = j->first + j->count;
+  j->forest = j->first + j->count;
+  orb_forest_plant(j->forest, j->count);
   for (int32_t k = 0; k < j->count; k++) {
     j->first[k] = -1;
-    j->parent[k] = k;
   }
   for (int32_t s = 0; s < j->shapes; s++) {
     j->tracers[s] = (orb_path_tracer){.ctx = j->ctx, .sheet = &sheets[s], .paths = &paths[s], .work = j->work};

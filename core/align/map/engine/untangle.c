@@ -12,6 +12,7 @@
 
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "numeric/frame.h"
@@ -175,17 +176,10 @@ typedef struct islands {
   double least_epsilon;
   int32_t count;
   island *list;
-  int32_t *part;   /* union-find; −1: the vertex stays */
+  int32_t *part;   /* forest; −1: the vertex stays */
   int32_t *order;  /* vertices by island */
   int32_t *number; /* of an island, by its lowest vertex */
 } islands;
-
-static int32_t find_part(int32_t *part, int32_t v) {
-  while (part[v] != v) {
-    v = part[v] = part[part[v]];
-  }
-  return v;
-}
 
 static int by_size(const void *a, const void *b) {
   const island *x = a, *y = b;
@@ -202,8 +196,7 @@ static void join_islands(islands *is, const unsigned char *mark) {
     for (int32_t i = l->start[v]; is->part[v] >= 0 && i < l->start[v + 1]; i++) {
       int32_t q = l->spoke[i].q;
       if (is->part[q] >= 0) {
-        int32_t a = find_part(is->part, v), b = find_part(is->part, q);
-        is->part[a > b ? a : b] = a > b ? b : a;
+        orb_forest_join(is->part, v, q);
       }
     }
   }
@@ -215,7 +208,7 @@ static int32_t list_islands(islands *is) {
   is->count = 0;
   for (int32_t v = 0; v < n; v++) {
     if (is->part[v] >= 0) {
-      is->part[v] = find_part(is->part, v);
+      is->part[v] = orb_forest_root(is->part, v);
       if (is->part[v] == v) {
         is->number[v] = is->count;
         is->list[is->count++] = (island){0, 0};

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/forest.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -35,27 +36,17 @@ void orb_map_patch_free(orb_map_patch *patch) {
   memset(patch, 0, sizeof *patch);
 }
 
-static int32_t find_piece(int32_t *joined, int32_t v) {
-  while (joined[v] != v) {
-    v = joined[v] = joined[joined[v]];
-  }
-  return v;
-}
-
 void orb_map_patch_join(orb_map_patch *patch, const unsigned char *flag, int value) {
   const orb_map_surface *b = patch->b;
-  for (int32_t v = 0; v < b->vertex_count; v++) {
-    patch->joined[v] = v;
-  }
+  orb_forest_plant(patch->joined, b->vertex_count);
   for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
     int32_t v = b->triangles[h], u = b->triangles[orb_next(h)];
     if (flag[v] == value && flag[u] == value) {
-      int32_t p = find_piece(patch->joined, v), q = find_piece(patch->joined, u);
-      patch->joined[p > q ? p : q] = p > q ? q : p;
+      orb_forest_join(patch->joined, v, u);
     }
   }
   for (int32_t v = 0; v < b->vertex_count; v++) {
-    patch->joined[v] = find_piece(patch->joined, v);
+    patch->joined[v] = orb_forest_root(patch->joined, v);
   }
 }
 

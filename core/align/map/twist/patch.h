@@ -15,7 +15,7 @@ typedef struct orb_map_patch {
   unsigned char *inside;  /* one flag for each vertex of the surface: 0, ORB_PATCH_LIMB or ORB_PATCH_END */
   unsigned char *next;    /* the same while the part grows */
   unsigned char *reached; /* 1 for the vertices of the end that have a neighbour in the limb */
-  int32_t *joined;        /* a representative of each vertex's piece; union-find */
+  int32_t *joined;        /* a representative of each vertex's piece; a forest */
   int32_t *corner;        /* a half-edge out of each vertex */
   int32_t *rim;           /* the last ring that was added */
   int32_t rim_count;
