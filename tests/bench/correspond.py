@@ -7,7 +7,8 @@
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
 docs/bench-truth.md, `drawn` 84 pairs of animals of other kinds for each seed, `parts` 81 heads and busts, `plans` spiders,
-beetles, hands, birds, lizards, fish and centaurs, `apes` 48 people with the proportions of an ape and other people. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half
+beetles, hands, birds, lizards, fish and centaurs, `drawn-plans` 28 pairs of these for each seed, `apes` 48 people with the
+proportions of an ape and other people. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half
 that is only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
 pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
@@ -319,6 +320,8 @@ def list_pairs(options):
             "apes": correspond_pairs.ape_pairs(meshes, options.store),
             "parts": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, of_parts=True),
             "plans": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store, of_plans=True),
+            "drawn-plans": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store,
+                                                    list(map(int, options.seeds.split(","))), of_plans=True),
             "real": correspond_pairs.real(meshes, surface_of)}
     unknown = set(wanted) - set(sets)
     if unknown:
@@ -342,7 +345,7 @@ def main():
     parser.add_argument("--base", help="a folder of programs, or a revision")
     parser.add_argument("--meshes", default=ROOT / "../shared/meshes")
     parser.add_argument("--set", default="people,animals,real")
-    parser.add_argument("--seeds", default="23", help="of the set `drawn`, with commas")
+    parser.add_argument("--seeds", default="23", help="of the sets `drawn` and `drawn-plans`, with commas")
     parser.add_argument("--half", choices=("choose", "report", "all"), default="all")
     parser.add_argument("--given", default="0", help="numbers with commas")
     parser.add_argument("--preset", choices=("fast", "default", "quality"), default="default")

@@ -86,6 +86,25 @@ def drawn(seed):
     return rows
 
 
+DRAWN = "same kind, drawn"
+
+
+def drawn_plans(rows, seed):
+    """Four pairs of each kind of the rows of plans.csv, in any of its poses, some slim or stout. Nothing was chosen on them."""
+    poses = {}
+    for row in rows:
+        for name in row[:2]:
+            words = pathlib.Path(name).stem.split("-")
+            poses.setdefault(words[0], set()).add(words[-1])
+    draw, pairs = random.Random(seed), []
+    for kind in sorted(poses):
+        while sum(pair[0].startswith(kind) for pair in pairs) < 4:
+            names = [f"{kind}-{draw.choice(['', '', 'slim-', 'stout-'])}{pose}.obj" for pose in draw.sample(sorted(poses[kind]), 2)]
+            if (*names, DRAWN) not in pairs:
+                pairs.append((*names, DRAWN))
+    return pairs
+
+
 PARTS_CHOSEN_ON = 27  # the first pairs of parts()
 
 
@@ -134,8 +153,8 @@ def ape_pairs(meshes, store):
 
 
 def animals(program, store, seeds=(), of_parts=False, of_plans=False):
-    """Generated bodies, in a folder for each build of the program: the pairs that it lists, drawn ones, parts, or other plans. A body
-    is written when it is first needed."""
+    """Generated bodies, in a folder for each build of the program: the pairs that it lists, drawn ones, parts, or other plans,
+    listed or drawn. A body is written when it is first needed."""
     if not program.exists():
         return
     folder = store / f"animals-{hashlib.sha256(program.read_bytes()).hexdigest()[:8]}"
@@ -154,13 +173,17 @@ def animals(program, store, seeds=(), of_parts=False, of_plans=False):
 
     if of_parts:
         yield from folder_pairs("parts", folder, parts(), lambda i, _: "choose" if i < PARTS_CHOSEN_ON else "report", make)
-    elif of_plans:
+    elif of_plans and not seeds:
         yield from folder_pairs("plans", folder, listed(folder, "plans"), lambda _, title: half_of(title), make)
     elif not seeds:
         yield from folder_pairs("animals", folder, listed(folder), lambda _, title: half_of(title), make)
     for seed in seeds:
-        half = "choose" if seed in CHOSEN_ON else "report"
-        yield from folder_pairs(f"drawn {seed}", folder, drawn(seed), lambda *_, half=half: half, make)
+        if of_plans:
+            rows = drawn_plans(listed(folder, "plans"), seed)
+            yield from folder_pairs(f"plans {seed}", folder, rows, lambda *_: "report", make)
+        else:
+            half = "choose" if seed in CHOSEN_ON else "report"
+            yield from folder_pairs(f"drawn {seed}", folder, drawn(seed), lambda *_, half=half: half, make)
 
 
 def vertex_place(surface, v, of):

@@ -42,6 +42,16 @@ class Correspond(unittest.TestCase):
         self.assertEqual({kinds.count(both) for both in kinds}, {4})
         self.assertEqual(len(set(kinds)), 21)
 
+    def test_a_seed_draws_pairs_of_other_plans_too(self):
+        listed = [("hand-stand.obj", "hand-stout-grip.obj", ""), ("fish-swim.obj", "fish-dart.obj", "")]
+        rows = correspond_pairs.drawn_plans(listed, 1)
+        self.assertEqual(rows, correspond_pairs.drawn_plans(listed, 1))
+        self.assertNotEqual(rows, correspond_pairs.drawn_plans(listed, 2))
+        self.assertEqual([row[0].split("-")[0] for row in rows], 4 * ["fish"] + 4 * ["hand"])
+        for row in rows:
+            poses = {name.removesuffix(".obj").split("-")[-1] for name in row[:2]}
+            self.assertEqual(poses, {"swim", "dart"} if row[0].startswith("fish") else {"stand", "grip"})
+
     def test_an_ape_keeps_its_triangles_and_changes_its_limbs(self):
         """With a cat for a person: its forelegs are the arms, its hind legs the legs."""
         cat, limbs = self.surfaces[0], {}

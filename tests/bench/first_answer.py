@@ -6,7 +6,7 @@
 
 Builds the base (8bbd71c) once in the cache folder, then alternates between both versions on every row: `orbmorph-bench
 merge` reads, embeds, aligns and remeshes two shapes and writes the asset, without a store. CPU and wall seconds are
-medians of the repeats. A ratio is base / this version, so more than 1 is faster. A `cold` row does the same over HTTP
+medians of the repeats. A ratio is base / this version, so more than 1 is faster. Then all rows are measured over HTTP, each
 with a daemon that has just started: two uploads and one POST that waits for the asset. --pairs N adds N pairs without
 landmarks, spread evenly over all pairs of the good meshes. Standard library only; needs cmake, git and curl.
 """
@@ -62,7 +62,7 @@ def marks_of(pair, folder):
 
 
 def rows(options, folder):
-    """Yields name, arguments of orbmorph-bench merge and files; a cold row has the members of the request instead."""
+    """Yields name, arguments of orbmorph-bench merge and files."""
     samples, good = ROOT / "tests/samples", options.meshes / "good"
     dog, giraffe = samples / "dog.obj", samples / "giraffe.off"
     marks = samples / "dog-giraffe.json"
@@ -150,6 +150,37 @@ def run_row(programs, row, options):
     return cells, cpu, stages
 
 
+def members_of(arguments):
+    """The members of the request that asks for what these arguments of orbmorph-bench merge do."""
+    given = dict(zip(arguments[::2], arguments[1::2]))
+    if "--landmarks" not in given:
+        return {}
+    read = json.loads(pathlib.Path(given["--landmarks"]).read_text())
+    return {"landmarks": read["landmarks"] if isinstance(read, dict) else read,
+            "align": {"options": {"preset": given["--align-preset"]}}}
+
+
+def cold_table(programs, chosen, options):
+    """The rows again, over HTTP, and their medians."""
+    text = "## Cold over HTTP\n\nFrom the first upload to the last byte of the asset, with a daemon that has just started.\n\n"
+    text += line(("request", "base s", "now s", "ratio")) + "|---" * 4 + "|\n"
+    kinds = {"fast": [], "default": [], "no landmarks": []}
+    for name, arguments, files in chosen:
+        runs = [{side: cold(program, members_of(arguments), files) for side, program in programs.items()}
+                for _ in range(options.repeat)]
+        seconds = {side: statistics.median(run[side] for run in runs) for side in programs}
+        kinds[name.split(", ")[-1]].append(seconds)
+        text += line((name, f"{seconds['base']:.2f}", f"{seconds['now']:.2f}", f"{seconds['base'] / seconds['now']:.1f}"))
+        print(text.splitlines()[-1], flush=True)
+    text += "\n" + line(("median of", "rows", "base s", "now s", "at most", "ratio")) + "|---" * 6 + "|\n"
+    for kind, found in ((kind, found) for kind, found in kinds.items() if found):
+        base, now = (statistics.median(one[side] for one in found) for side in programs)
+        ratio = statistics.median(one["base"] / one["now"] for one in found)
+        text += line((kind if kind == "no landmarks" else f"landmarks, {kind}", len(found), f"{base:.2f}", f"{now:.2f}",
+                      f"{max(one['now'] for one in found):.2f}", f"{ratio:.1f}"))
+    return text
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--base", default="8bbd71c")
@@ -167,24 +198,17 @@ def main():
     text += line(COLUMNS) + "|---" * len(COLUMNS) + "|\n"
     ratios = []
     with tempfile.TemporaryDirectory() as folder:
-        for row in rows(options, folder):
-            if options.rows and not any(wanted in row[0] for wanted in options.rows):
-                continue
+        chosen = [row for row in rows(options, folder) if not options.rows or any(part in row[0] for part in options.rows)]
+        if not chosen:
+            sys.exit("no row has such a name")
+        for row in chosen:
             cells, cpu, _ = run_row(programs, row, options)
             ratios.append(cpu["base"] / cpu["now"])
             text += line(cells)
             print(line(cells), end="", flush=True)
-    if not ratios:
-        sys.exit("no row has such a name")
-    text += f"\nCPU, all rows: {statistics.median(ratios):.2f} in the median, {min(ratios):.2f} at least.\n\n"
-    text += "## Cold over HTTP\n\n" + line(("request", "base s", "now s", "ratio")) + "|---" * 4 + "|\n"
-    samples = ROOT / "tests/samples"
-    for name, members in (("dog–giraffe, `fast`, no landmarks", {"align": {"method": "auto", "options": {"preset": "fast"}}}),
-                          ("dog–giraffe, no landmarks", {})):
-        seconds = {side: statistics.median(cold(program, members, [samples / "dog.obj", samples / "giraffe.off"])
-                                           for _ in range(options.repeat)) for side, program in programs.items()}
-        text += line((name, f"{seconds['base']:.2f}", f"{seconds['now']:.2f}", f"{seconds['base'] / seconds['now']:.1f}"))
-    print(text.split("## Cold")[1])
+        text += f"\nCPU, all rows: {statistics.median(ratios):.2f} in the median, {min(ratios):.2f} at least.\n\n"
+        text += cold_table(programs, chosen, options)
+    print(text.split("| median of")[1])
     if options.out:
         options.out.write_text(text, encoding="utf-8")
 
