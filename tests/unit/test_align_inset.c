@@ -434,7 +434,7 @@ static void memory_runs_out(void **state) {
   const int64_t calls = search_rationed(&s, INT64_MAX, &status);
   assert_int_equal(status, ORB_OK);
   assert_true(calls > 8);
-  for (int64_t at = 1; at <= calls; at += IS_SLOW ? 3 : 1) { /* the allocation of the context comes before these */
+  for (int64_t at = 1; at <= calls; at += IS_SLOW ? 6 : 1) { /* the allocation of the context comes before these */
     (void)search_rationed(&s, at, &status);
     assert_int_equal(status, ORB_E_NO_MEMORY);
   }

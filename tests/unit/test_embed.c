@@ -229,7 +229,7 @@ static void test_cancel_everywhere(void **unused) {
   orb_context *plain = open_context(1);
   orb_mesh mesh = shape_globe(plain, IS_SLOW ? 5000 : 20000, 2);
   int cancelled = 0, done = 0;
-  for (int n = 0; !done; n += 7) {
+  for (int n = 0; !done; n += IS_SLOW ? 23 : 7) {
     cancelling c = {.left = n};
     orb_context_options options = {.threads = 1, .progress = cancel_now, .progress_user = &c};
     assert_int_equal(orb_context_create(&options, &c.ctx), ORB_OK);
