@@ -1,253 +1,12 @@
-/* Alignments as bytes. An aligned shape differs from the given mesh by splits and edge flips, if at all: vertices of
- * the given mesh keep their numbers, positions and sources, and most triangles are the same.
- *
- *   char[8] "ORBALIGN", uint32 version, uint32 0x01020304 (byte order)
- *   int32 shapes, landmarks, found, followed; double energy; for each shape uint64[2] digests of the given positions
- *     and triangles
- *   int32 1, int32 part and double bend, clear, lead, confidence of the match, or 0
- *   int32 alternatives; for each double cost, int32 shape, int32 count, count × shapes places (int32 triangle,
- *     double[3])
- *   int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place
- *   int32 1 and double share of each landmark, or 0
- *   int32 rims; for each int32 shape, and for either side int32 hole, int32 edges, double length; double off
- *   found × shapes places, found × double[3] points, found × double confidence
- *   for each shape: int32 vertices, triangles, changed; double[3] point of each vertex; position and int32 source of
- *     each added vertex; the changed triangles, each with its number, corners, parent, source_triangle, material and
- * the attributes of its corners, where the mesh has them; int32 1 and the vertex of each landmark, or 0
- *
- * A triangle that is not listed is that of the given mesh, with itself as parent. */
-#include "orbmorph/kept.h"
+/* Reads alignments from bytes that may be anything. kept.h has the format. */
+#include "merge/kept.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "base/error.h"
-#include "base/hash.h"
 #include "base/memory.h"
-
-enum { VERSION = 8, BYTE_ORDER_MARK = 0x01020304 };
-static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
-
-/* A new member of the alignment must be written and read here, with a new VERSION. */
-_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 152, "write and read the new member");
-_Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
-               "write and read the new member");
-
-/* Tells meshes apart that have the same connectivity, such as one body in two poses. */
-static void digest_of(const orb_mesh *mesh, uint64_t digest[2]) {
-  static const uint64_t key[2] = {0x6f72626d6f727068, 0x616c69676e6d656e};
-  digest[0] = orb_siphash13(key, mesh->positions, 3 * (size_t)mesh->vertex_count * sizeof *mesh->positions);
-  digest[1] = orb_siphash13(key, mesh->triangles, 3 * (size_t)mesh->triangle_count * sizeof *mesh->triangles);
-}
-
-/* One array of a mesh with a fixed number of bytes per triangle. */
-typedef struct column {
-  void *data; /* NULL: the mesh has none */
-  size_t size;
-} column;
-
-enum { COLUMNS = 5 };
-static void columns_of(const orb_mesh *mesh, column out[COLUMNS]) {
-  const column columns[COLUMNS] = {{mesh->source_triangle, sizeof(int32_t)},
-                                   {mesh->material, sizeof(int32_t)},
-                                   {mesh->normals, 9 * sizeof(float)},
-                                   {mesh->texcoords, 6 * sizeof(float)},
-                                   {mesh->colors, 12 * sizeof(float)}};
-  memcpy(out, columns, sizeof columns);
-}
-
-/* Whether triangle t of the aligned shape is that of the given mesh. */
-static int is_same(const orb_mesh *given, const orb_aligned_shape *shape, int32_t t) {
-  const orb_mesh *mesh = &shape->mesh;
-  column before[COLUMNS], now[COLUMNS];
-  const size_t at = (size_t)t;
-  if (t >= given->triangle_count || shape->parent[t] != t ||
-      memcmp(given->triangles + 3 * at, mesh->triangles + 3 * at, 3 * sizeof(int32_t)) != 0) {
-    return 0;
-  }
-  columns_of(given, before);
-  columns_of(mesh, now);
-  for (int c = 0; c < COLUMNS; c++) {
-    if (now[c].data && memcmp((char *)before[c].data + at * before[c].size, (char *)now[c].data + at * now[c].size,
-                              now[c].size) != 0) {
-      return 0;
-    }
-  }
-  return 1;
-}
-
-/* Whether the aligned shape keeps the vertices of the given mesh, and has the same arrays. */
-static int keeps(const orb_mesh *given, const orb_mesh *mesh) {
-  const size_t n = (size_t)given->vertex_count;
-  column before[COLUMNS], now[COLUMNS];
-  columns_of(given, before);
-  columns_of(mesh, now);
-  int same = mesh->vertex_count >= given->vertex_count && mesh->triangle_count >= given->triangle_count &&
-             !mesh->source == !given->source &&
-             memcmp(mesh->positions, given->positions, 3 * n * sizeof(double)) == 0 &&
-             (!mesh->source || memcmp(mesh->source, given->source, n * sizeof(int32_t)) == 0);
-  for (int c = 0; c < COLUMNS; c++) {
-    same = same && !now[c].data == !before[c].data;
-  }
-  return same;
-}
-
-/* Appends to a buffer until the first failure. */
-typedef struct writer {
-  orb_context *ctx;
-  orb_buffer *out;
-  orb_status status;
-} writer;
-
-static void put(writer *w, const void *bytes, size_t size) {
-  if (w->status == ORB_OK && size > 0) {
-    w->status = orb_buffer_append(w->ctx, w->out, bytes, size);
-  }
-}
-
-static void put_integer(writer *w, int32_t value) {
-  put(w, &value, sizeof value);
-}
-
-static void put_triangle(writer *w, const orb_aligned_shape *shape, int32_t t) {
-  column columns[COLUMNS];
-  columns_of(&shape->mesh, columns);
-  put_integer(w, t);
-  put(w, shape->mesh.triangles + 3 * (size_t)t, 3 * sizeof(int32_t));
-  put_integer(w, shape->parent[t]);
-  for (int c = 0; c < COLUMNS; c++) {
-    if (columns[c].data) {
-      put(w, (char *)columns[c].data + (size_t)t * columns[c].size, columns[c].size);
-    }
-  }
-}
-
-static void put_shape(writer *w, const orb_mesh *given, const orb_aligned_shape *shape, int32_t landmarks) {
-  const orb_mesh *mesh = &shape->mesh;
-  const size_t vertices = (size_t)mesh->vertex_count, first = (size_t)given->vertex_count;
-  int32_t changed = 0;
-  for (int32_t t = 0; t < mesh->triangle_count; t++) {
-    changed += !is_same(given, shape, t);
-  }
-  put_integer(w, mesh->vertex_count);
-  put_integer(w, mesh->triangle_count);
-  put_integer(w, changed);
-  put(w, shape->points, 3 * vertices * sizeof(double));
-  put(w, mesh->positions + 3 * first, 3 * (vertices - first) * sizeof(double));
-  if (mesh->source) {
-    put(w, mesh->source + first, (vertices - first) * sizeof(int32_t));
-  }
-  for (int32_t t = 0; t < mesh->triangle_count; t++) {
-    if (!is_same(given, shape, t)) {
-      put_triangle(w, shape, t);
-    }
-  }
-  put_integer(w, shape->landmark_vertices != NULL);
-  put(w, shape->landmark_vertices, shape->landmark_vertices ? (size_t)landmarks * sizeof(int32_t) : 0);
-}
-
-static void put_places(writer *w, const orb_place *places, size_t count) {
-  for (size_t i = 0; i < count; i++) {
-    put_integer(w, places[i].triangle);
-    put(w, places[i].at, sizeof places[i].at);
-  }
-}
-
-static void put_match(writer *w, const orb_alignment *a) {
-  put_integer(w, a->match.is_measured);
-  if (a->match.is_measured) {
-    put_integer(w, a->match.is_part);
-    put(w, &a->match.bend, sizeof a->match.bend);
-    put(w, &a->match.clear, sizeof a->match.clear);
-    put(w, &a->match.lead, sizeof a->match.lead);
-    put(w, &a->match.confidence, sizeof a->match.confidence);
-  }
-  put_integer(w, a->alternative_count);
-  for (int32_t i = 0; i < a->alternative_count; i++) {
-    const orb_alternative *one = &a->alternatives[i];
-    put(w, &one->cost, sizeof one->cost);
-    put_integer(w, one->shape);
-    put_integer(w, one->count);
-    put_places(w, one->at, (size_t)one->count * (size_t)a->shape_count);
-  }
-}
-
-static void put_suspects(writer *w, const orb_alignment *a) {
-  put_integer(w, a->suspect_count);
-  for (int32_t i = 0; i < a->suspect_count; i++) {
-    const orb_suspect *one = &a->suspects[i];
-    put_integer(w, one->landmark);
-    put_integer(w, one->shape);
-    put(w, &one->share, sizeof one->share);
-    put(w, &one->distance, sizeof one->distance);
-    put_places(w, &one->at, 1);
-  }
-}
-
-static void put_shares(writer *w, const orb_alignment *a) {
-  put_integer(w, a->landmark_shares != NULL);
-  if (a->landmark_shares) {
-    put(w, a->landmark_shares, (size_t)a->landmark_count * sizeof *a->landmark_shares);
-  }
-}
-
-static void put_rims(writer *w, const orb_alignment *a) {
-  put_integer(w, a->rim_count);
-  for (int32_t i = 0; i < a->rim_count; i++) {
-    const orb_rim_match *one = &a->rims[i];
-    put_integer(w, one->shape);
-    for (int k = 0; k < 2; k++) {
-      put_integer(w, one->hole[k]);
-      put_integer(w, one->edges[k]);
-      put(w, &one->length_relative[k], sizeof one->length_relative[k]);
-    }
-    put(w, &one->off_relative, sizeof one->off_relative);
-  }
-}
-
-static void put_found(writer *w, const orb_alignment *a) {
-  const size_t found = (size_t)a->found_count;
-  put_places(w, a->found, found * (size_t)a->shape_count);
-  put(w, a->found_points, 3 * found * sizeof(double));
-  put(w, a->confidence, found * sizeof(double));
-}
-
-orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, const orb_alignment *alignment,
-                               orb_buffer *out) {
-  writer w = {ctx, out, ORB_OK};
-  memset(out, 0, sizeof *out);
-  for (int32_t s = 0; s < alignment->shape_count; s++) {
-    if (!keeps(shapes[s].mesh, &alignment->shapes[s].mesh)) {
-      return orb_fail(ctx, ORB_E_BAD_OPTION, "Shape %d of the alignment does not extend the given mesh.", s);
-    }
-  }
-  put(&w, magic, sizeof magic);
-  put_integer(&w, VERSION);
-  put_integer(&w, BYTE_ORDER_MARK);
-  put_integer(&w, alignment->shape_count);
-  put_integer(&w, alignment->landmark_count);
-  put_integer(&w, alignment->found_count);
-  put_integer(&w, alignment->has_followed);
-  put(&w, &alignment->energy, sizeof alignment->energy);
-  for (int32_t s = 0; s < alignment->shape_count; s++) {
-    uint64_t digest[2];
-    digest_of(shapes[s].mesh, digest);
-    put(&w, digest, sizeof digest);
-  }
-  put_match(&w, alignment);
-  put_suspects(&w, alignment);
-  put_shares(&w, alignment);
-  put_rims(&w, alignment);
-  put_found(&w, alignment);
-  for (int32_t s = 0; s < alignment->shape_count; s++) {
-    put_shape(&w, shapes[s].mesh, &alignment->shapes[s], alignment->landmark_count);
-  }
-  if (w.status != ORB_OK) {
-    orb_buffer_free(ctx, out);
-  }
-  return w.status;
-}
 
 /* Takes bytes from the front. bad: something was wrong, and all later reads give zeros. */
 typedef struct reader {
@@ -315,8 +74,8 @@ static int grow_mesh(orb_context *ctx, orb_mesh *mesh, int32_t vertices, int32_t
 /* Triangles in rising order; those beyond the given mesh must all be there. */
 static void take_triangles(reader *r, const orb_mesh *given, orb_aligned_shape *shape, int32_t changed) {
   orb_mesh *mesh = &shape->mesh;
-  column columns[COLUMNS];
-  columns_of(mesh, columns);
+  orb_kept_column columns[ORB_KEPT_COLUMNS];
+  orb_kept_columns(mesh, columns);
   const int32_t materials = mesh->material_count > 0 ? mesh->material_count : 1;
   int32_t last = -1, added = 0;
   for (int32_t i = 0; i < changed && !r->bad; i++) {
@@ -325,7 +84,7 @@ static void take_triangles(reader *r, const orb_mesh *given, orb_aligned_shape *
       mesh->triangles[3 * (size_t)t + k] = take_integer(r, 0, mesh->vertex_count - 1);
     }
     shape->parent[t] = take_integer(r, 0, given->triangle_count - 1);
-    for (int c = 0; c < COLUMNS; c++) {
+    for (int c = 0; c < ORB_KEPT_COLUMNS; c++) {
       if (columns[c].data) {
         take(r, (char *)columns[c].data + (size_t)t * columns[c].size, columns[c].size);
       }
@@ -495,11 +254,11 @@ static orb_status take_found(orb_context *ctx, reader *r, const orb_align_shape 
 
 static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *shapes, int32_t shape_count,
                            orb_alignment *out) {
-  char head[sizeof magic];
+  char head[sizeof orb_kept_magic];
   take(r, head, sizeof head);
-  r->bad |= memcmp(head, magic, sizeof magic) != 0;
-  (void)take_integer(r, VERSION, VERSION);
-  (void)take_integer(r, BYTE_ORDER_MARK, BYTE_ORDER_MARK);
+  r->bad |= memcmp(head, orb_kept_magic, sizeof orb_kept_magic) != 0;
+  (void)take_integer(r, ORB_KEPT_VERSION, ORB_KEPT_VERSION);
+  (void)take_integer(r, ORB_KEPT_BYTE_ORDER, ORB_KEPT_BYTE_ORDER);
   (void)take_integer(r, shape_count, shape_count);
   const int32_t landmarks = take_integer(r, 0, 1 << 20), found = take_integer(r, 0, ORB_FOUND_MAX);
   out->has_followed = take_integer(r, 0, 1);
@@ -514,7 +273,7 @@ static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *s
   out->shape_count = shape_count;
   for (int32_t s = 0; s < shape_count; s++) {
     uint64_t digest[2], kept[2];
-    digest_of(shapes[s].mesh, digest);
+    orb_kept_digest(shapes[s].mesh, digest);
     take(r, kept, sizeof kept);
     r->bad |= memcmp(digest, kept, sizeof kept) != 0;
   }
