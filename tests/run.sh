@@ -136,14 +136,6 @@ start_chains() {
   behind=(nice -n 5)
 }
 
-count_browser() {
-  count_junit build/browser/tests.xml
-}
-
-count_waiting() {
-  count_junit build/waiting/tests.xml
-}
-
 # Starts the fuzz targets beside the steps that follow. Tests wait for a quarter of the cores' time; at this priority, the
 # targets take little else. They count CPU time, so they try as much as alone.
 fuzz= fuzz_began=
@@ -156,16 +148,20 @@ count_fuzz() {
   cut -d' ' -f1 build-fuzz/results
 }
 
-# Waits for a chain or the fuzz targets, prints what they printed, and adds their results to the totals.
+count_chain() {
+  count_junit "build/$1/tests.xml"
+}
+
+# Waits for a chain or the fuzz targets, prints what they printed, and adds to the totals what `count` says of their results.
 finish() {
-  local what=$1 status=0 failures pid began
+  local what=$1 count=$2 status=0 failures pid began
   pid=$what began=${what}_began
   failures=$(sum failed)
   echo "== $what =="
   wait "${!pid}" || status=$?
   printf -v "$what" ''
   cat "build/$what.log"
-  "count_$what" >>"$totals" || status=1
+  "$count" "$what" >>"$totals" || status=1
   ended "$what" $status "${!began}" "$failures"
 }
 
@@ -228,9 +224,9 @@ else
   run_step asan
   run_step release
   if [ -n "$browser" ]; then
-    finish browser
-    finish waiting
-    finish fuzz
+    finish browser count_chain
+    finish waiting count_chain
+    finish fuzz count_fuzz
   else
     run_step fuzz
   fi
