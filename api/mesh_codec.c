@@ -20,7 +20,7 @@ enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
 /* The least size is a float's rounding: no loop is shorter. The most is a path from end to end and back, with room for
  * detours: none is longer. */
-static const double HANDLE_SIZE_LEAST = 1e-6, HANDLE_SIZE_MOST = 10;
+static const double HANDLE_SIZE_LEAST = 1e-6;
 
 /* Refuses the value of a query parameter; returns 0. */
 API_PRINTF(3, 4) static int refuse(api_problem *problem, const char *parameter, const char *format, ...) {
@@ -42,7 +42,7 @@ static int read_handle_size(const char *text, size_t length, orb_repair_options 
     digits[length] = 0;
     size = strtod(digits, &end);
   }
-  if (end == digits || *end || !(size >= HANDLE_SIZE_LEAST && size <= HANDLE_SIZE_MOST)) {
+  if (end == digits || *end || !(size >= HANDLE_SIZE_LEAST && size <= ORB_HANDLE_SIZE_MOST)) {
     return refuse(problem, "handle_size",
                   "\"handle_size\" must be a number from 0.000001 to 10, such as 0.05: the length of a loop around "
                   "a handle relative to the diagonal.");

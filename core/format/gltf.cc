@@ -165,6 +165,7 @@ struct Reader {
   void begin_object(size_t mesh, const Shown *at) {
     const std::string name = text_of(meshes[mesh], "name"), node = at ? text_of(at->node, "name") : "";
     const std::string &title = name.empty() ? node : name;
+    buffers.spend(name.size() + node.size()); /* a name is copied as often as its mesh is shown */
     must(orb_build_object(&build, reinterpret_cast<const unsigned char *>(title.data()), title.size()));
     orb_build_object_node(&build, reinterpret_cast<const unsigned char *>(node.data()), node.size());
   }
@@ -192,6 +193,7 @@ struct Reader {
       texcoords |= member(attributes, texcoord_of(primitive).c_str()) != nullptr;
     });
     auto add = [&](size_t mesh, const Shown *at) {
+      must(orb_context_check(ctx));
       begin_object(mesh, at);
       blaming({culprit("meshes", meshes, mesh)}, [&] {
         for (const cJSON *primitive : array_of(meshes[mesh], "primitives")) {

@@ -1,6 +1,5 @@
 #include "format/gltf_packed.hh"
 
-#include <draco/compression/decode.h>
 #include <meshoptimizer.h>
 
 namespace gltf {
@@ -10,9 +9,8 @@ namespace {
 /* Compressed meshes are 3 to 30 times smaller; a run of equal bytes may be much more. */
 const size_t GROWTH_MAX = 200, SMALL = 1u << 20;
 
-/* What Draco takes while it decodes: the largest table of its entropy coder (2^20 entries of 4 bytes), which a
- * primitive of any size may ask for, and for each byte. */
-const size_t DRACO_TABLE = 4u << 20, DRACO_A_BYTE = 64;
+/* What looking up the members of a compressed primitive counts as, in bytes. */
+const size_t PRIMITIVE = 1024;
 
 const cJSON *extension_of(const cJSON *object, const char *name) {
   return member(member(object, "extensions"), name);
@@ -29,6 +27,18 @@ Bytes part_of(const Bytes &bytes, size_t offset, size_t length) {
 double nearest_share(double value, double most) {
   const double whole = std::round(value * most);
   return std::fabs(value * most - whole) < SHARE_ERROR ? std::fmax(whole / most, -1) : value;
+}
+
+/* Calls use(primitive, its extension) for all primitives that Draco has compressed. */
+template <typename Use>
+void for_compressed(const cJSON *doc, Use use) {
+  for (const cJSON *mesh : array_of(doc, "meshes")) {
+    for (const cJSON *primitive : array_of(mesh, "primitives")) {
+      if (const cJSON *extension = extension_of(primitive, DRACO)) {
+        use(primitive, extension);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -111,21 +121,18 @@ void Packed::load_view(int64_t index, const cJSON *extension, Bytes bytes) {
   views_.insert_or_assign(index, std::move(out));
 }
 
-/* https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_draco_mesh_compression */
-void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSON *extension, Bytes bytes) {
-  /* Draco's memory is not charged to the context; a block of that size, never touched, stands for it. */
-  Octets reserve{Charged<unsigned char>(ctx_)};
-  reserve.reserve(DRACO_TABLE + DRACO_A_BYTE * bytes.size);
-  draco::DecoderBuffer buffer;
-  buffer.Init(reinterpret_cast<const char *>(bytes.at), bytes.size);
-  draco::Decoder decoder;
-  auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-  if (!decoded.ok()) {
-    malformed("A glTF primitive (KHR_draco_mesh_compression) cannot be decoded: " +
-              decoded.status().error_msg_string().substr(0, 80));
+/* The mesh of a view, which is kept for further primitives that have it. */
+const draco::Mesh &Packed::mesh_of(int64_t view, Bytes bytes) {
+  auto found = meshes_.find(view);
+  if (found == meshes_.end()) {
+    found = meshes_.emplace(view, decode_draco(ctx_, bytes, [this](size_t decoded) { charge(decoded); })).first;
   }
-  const draco::Mesh &mesh = *decoded.value();
-  const List accessors = array_of(doc, "accessors");
+  return *found->second.mesh;
+}
+
+/* https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_draco_mesh_compression */
+void Packed::load_primitive(const List &accessors, const cJSON *primitive, const cJSON *extension,
+                            const draco::Mesh &mesh) {
   const cJSON *attributes = member(primitive, "attributes"), *ids = member(extension, "attributes");
   for (const cJSON *id = cJSON_IsObject(ids) ? ids->child : nullptr; id; id = id->next) {
     int64_t index = whole(attributes, id->string, NONE);
@@ -176,6 +183,21 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
   accessors_.insert_or_assign(indices, std::move(corners));
 }
 
+void Packed::load_primitives(const cJSON *doc, const std::function<Bytes(int64_t)> &view) {
+  const List accessors = array_of(doc, "accessors");
+  std::map<int64_t, size_t> uses; /* of each view, by primitives that are still to be loaded */
+  for_compressed(doc, [&](const cJSON *, const cJSON *extension) { uses[whole(extension, "bufferView", NONE)]++; });
+  for_compressed(doc, [&](const cJSON *primitive, const cJSON *extension) {
+    const int64_t index = whole(extension, "bufferView", NONE);
+    charge(PRIMITIVE);
+    load_primitive(accessors, primitive, extension, mesh_of(index, view(index)));
+    if (--uses[index] == 0) {
+      meshes_.erase(index);
+    }
+    must(orb_context_check(ctx_));
+  });
+}
+
 void Packed::load(const cJSON *doc, const std::function<Bytes(int64_t)> &buffer,
                   const std::function<Bytes(int64_t)> &view, size_t file_size) {
   left_ = SMALL + GROWTH_MAX * file_size;
@@ -188,13 +210,7 @@ void Packed::load(const cJSON *doc, const std::function<Bytes(int64_t)> &buffer,
       load_view(static_cast<int64_t>(i), extension, bytes);
     }
   }
-  for (const cJSON *mesh : array_of(doc, "meshes")) {
-    for (const cJSON *primitive : array_of(mesh, "primitives")) {
-      if (const cJSON *extension = extension_of(primitive, DRACO)) {
-        load_primitive(doc, primitive, extension, view(whole(extension, "bufferView", NONE)));
-      }
-    }
-  }
+  load_primitives(doc, view);
 }
 
 }  // namespace gltf

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 
+#include "format/gltf_draco.hh"
 #include "format/gltf_values.hh"
 
 namespace gltf {
@@ -47,13 +48,16 @@ class Packed {
 
  private:
   void load_view(int64_t index, const cJSON *extension, Bytes bytes);
-  void load_primitive(const cJSON *doc, const cJSON *primitive, const cJSON *extension, Bytes bytes);
+  void load_primitives(const cJSON *doc, const std::function<Bytes(int64_t)> &view);
+  void load_primitive(const List &accessors, const cJSON *primitive, const cJSON *extension, const draco::Mesh &mesh);
+  const draco::Mesh &mesh_of(int64_t view, Bytes bytes);
   void charge(size_t bytes);
 
   orb_context *ctx_;
   std::map<int64_t, Octets> views_;
   std::map<int64_t, Values> accessors_;
-  size_t left_ = 0; /* bytes that may still be decoded */
+  std::map<int64_t, DracoMesh> meshes_; /* of views that primitives still have to load */
+  size_t left_ = 0;                     /* bytes that may still be decoded */
 };
 
 /* Whether a buffer stands for the uncompressed data only and has no bytes. */

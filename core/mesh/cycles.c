@@ -28,6 +28,9 @@ enum { NEAR_VERTICES = 6000000, NEAR_LEAST = 64 };
  * others cost little, so each seed has its own. SLACK: how much longer than need be a long loop may become, relative.
  * The larger, the fewer searches: their number along a line of seeds is the line's length over half of it. */
 enum { LONG_SEARCH = 256 };
+/* A vertex of more edges than this counts as several settled ones: of a file of few vertices and many faces, each
+ * vertex has thousands. Twice the mean of a closed surface, so that others count as one. */
+enum { EDGES_A_VERTEX = 12 };
 static const double SLACK = 0.125;
 enum { ROUND = 2 };                  /* what labels and a cut cost, in settled vertices for each triangle */
 enum { GENERATORS_MOST = 16000000 }; /* edges of all generators that are kept beside those searches: 64 MB */
@@ -38,7 +41,7 @@ typedef struct work {
   int32_t *seed, seed_count;
   int32_t *left, left_count; /* half-edges, one for each generator */
   unsigned char *passed;     /* of each vertex: its shortest cycle is not wanted */
-  int64_t settled;           /* by the last search */
+  int64_t settled, in_all;   /* by the last search, and by all */
   int64_t *allowed;          /* vertices that searches may still settle; NULL: any number */
   orb_cycle *found;
   int32_t found_count, found_room;
@@ -46,15 +49,24 @@ typedef struct work {
   int32_t pool_count, pool_room;
 } work;
 
+static int64_t larger(int64_t a, int64_t b) {
+  return a > b ? a : b;
+}
+
 /* The shortest cycle through the seed that does not divide the surface and is shorter than *length: returns the
  * half-edge that closes it and updates *length; −1: there is none. most: vertices to settle. */
 static int32_t search(work *w, int32_t seed, int64_t most, double *length) {
   int32_t closing = -1;
+  int64_t vertices = 0, edges = 0, check = SETTLED_EVERY;
   orb_dijkstra_start(&w->p, seed);
   for (w->settled = 0; w->p.heap_count > 0 && w->settled < most;) {
     int32_t v = orb_dijkstra_pop(&w->p);
-    int late =
-        ++w->settled % SETTLED_EVERY == 0 && orb_context_check(w->p.s->ctx) != ORB_OK; /* the caller asks again */
+    w->settled = larger(++vertices, edges / EDGES_A_VERTEX);
+    int late = 0;
+    if (w->settled >= check) {
+      late = orb_context_check(w->p.s->ctx) != ORB_OK; /* the caller asks again */
+      check += SETTLED_EVERY;
+    }
     if (late || 2 * w->p.distance[v] >= *length) {
       break;
     }
@@ -70,9 +82,12 @@ static int32_t search(work *w, int32_t seed, int64_t most, double *length) {
         *length = distance + w->p.distance[to];
         closing = h;
       }
+      edges++;
       h = w->p.s->twin[orb_prev(h)];
     } while (h != w->p.corner[v]);
+    w->settled = larger(vertices, edges / EDGES_A_VERTEX);
   }
+  w->in_all += w->settled;
   return closing;
 }
 
@@ -195,7 +210,8 @@ static orb_status search_seeds(work *w, int64_t count, int64_t most, double limi
 }
 
 static orb_status search_whole(work *w) {
-  int64_t most = WHOLE_VERTICES / w->p.s->mesh->vertex_count;
+  const orb_mesh *mesh = w->p.s->mesh;
+  int64_t most = WHOLE_VERTICES / larger(mesh->vertex_count, 3 * (int64_t)mesh->triangle_count / EDGES_A_VERTEX);
   most = most < WHOLE_LEAST ? WHOLE_LEAST : most;
   return search_seeds(w, w->seed_count < most ? w->seed_count : most, INT64_MAX, INFINITY);
 }
@@ -250,8 +266,9 @@ static orb_status search_within(work *w, double limit) {
 }
 
 /* Searches the surroundings of each edge that is left, and of as many other seeds, so that cycles share no vertex. */
-static orb_status search_near(work *w) {
-  int64_t searches = w->left_count < w->seed_count ? w->left_count : w->seed_count, most = NEAR_VERTICES;
+static orb_status search_near(work *w, int64_t settled) {
+  int64_t searches = w->left_count < w->seed_count ? w->left_count : w->seed_count;
+  int64_t most = settled / 2 < NEAR_VERTICES ? settled / 2 : NEAR_VERTICES;
   most = searches > 0 ? most / searches : most;
   most = most < NEAR_LEAST ? NEAR_LEAST : most;
   ORB_TRY(search_seeds(w, searches, most, INFINITY));
@@ -318,6 +335,7 @@ static orb_status choose(work *w, int32_t most, int independent, orb_cycles *out
     }
   }
   out->half_edges = w->pool;
+  out->settled = w->in_all;
   w->pool = NULL;
   orb_free(ctx, taken);
   orb_free(ctx, order);
@@ -359,7 +377,7 @@ orb_status orb_cycles_find(orb_surface *s, double limit, int32_t most, int64_t *
   return status;
 }
 
-orb_status orb_cycles_generate(orb_surface *s, orb_cycles *out) {
+orb_status orb_cycles_generate(orb_surface *s, int64_t settled, orb_cycles *out) {
   work w = {0};
   orb_status status = open_work(&w, s, out);
   if (status == ORB_OK) {
@@ -369,7 +387,7 @@ orb_status orb_cycles_generate(orb_surface *s, orb_cycles *out) {
     status = list_seeds(&w);
   }
   if (status == ORB_OK) {
-    status = search_near(&w);
+    status = search_near(&w, settled);
   }
   if (status == ORB_OK) {
     status = choose(&w, INT32_MAX, 0, out);

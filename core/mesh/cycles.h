@@ -15,6 +15,7 @@ typedef struct orb_cycles {
   orb_cycle *cycle;
   int32_t *half_edges;
   int32_t count;
+  int64_t settled; /* vertices, by the searches; one of many edges counts as several */
 } orb_cycles;
 
 /* Of as many cycles labels tell whether they leave the surface connected together: they have 64 bits. */
@@ -35,9 +36,9 @@ ORB_MUST_CHECK orb_status orb_cycles_find(orb_surface *surface, double limit, in
                                           orb_cycles *out);
 
 /* Finds as many cycles of any length as share no vertex, shortest first, among those of generators and of searches near
- * them. Each leaves the surface connected; orb_cycles_apart() keeps those that do so together. O(F log F + their total
- * length). */
-ORB_MUST_CHECK orb_status orb_cycles_generate(orb_surface *surface, orb_cycles *out);
+ * them. Each leaves the surface connected; orb_cycles_apart() keeps those that do so together. settled: vertices that
+ * the searches may settle, but each some. O(F log F + their total length). */
+ORB_MUST_CHECK orb_status orb_cycles_generate(orb_surface *surface, int64_t settled, orb_cycles *out);
 
 void orb_cycles_free(orb_context *ctx, orb_cycles *cycles);
 

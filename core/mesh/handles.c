@@ -30,8 +30,10 @@ static const double FIRST_LIMIT = 0.125;
  * take up to 89, tori 32; where searches cannot share their work (see cycles.c), a million triangles could take a
  * thousand each. A vertex takes 0.15 µs. */
 enum { SETTLED_A_TRIANGLE = 256, SETTLED_LEAST = 1000000 };
-/* Rounds that search for the loops to list in an error; each costs some searches of the whole surface. */
-enum { LIST_ROUNDS = 24 };
+/* Rounds that search for the loops to list in an error; each costs some searches of the whole surface. No round begins
+ * once searches have settled so many vertices for each triangle, and on small meshes besides: what is found by then is
+ * listed. */
+enum { LIST_ROUNDS = 24, LISTED_A_TRIANGLE = 16, LISTED_LEAST = 4000000 };
 /* A round of whole searches finds 64 loops at most. Of more handles than this, each round finds as many
  * short ones as share no vertex; plates, lattices and balls with tubes took one to seven rounds. */
 enum { FEW_HANDLES = 1000, MANY_ROUNDS = 8 };
@@ -293,10 +295,11 @@ static orb_status list_round(orb_surface *s, orb_cycles *cycles, double diagonal
 orb_status orb_surface_list_handles(orb_surface *s, int64_t genus, orb_loops *out) {
   double facing, diagonal = diagonal_of(s->mesh, &facing);
   int many = genus > FEW_HANDLES, rounds = many ? MANY_ROUNDS : LIST_ROUNDS;
-  for (int round = 0; round < rounds && genus > 0; round++) {
+  int64_t left = LISTED_LEAST + LISTED_A_TRIANGLE * (int64_t)s->mesh->triangle_count;
+  for (int round = 0; round < rounds && genus > 0 && left > 0; round++) {
     orb_cycles cycles = {0};
     orb_status status =
-        many ? orb_cycles_generate(s, &cycles) : orb_cycles_find(s, INFINITY, ORB_CYCLES_LABELLED, NULL, &cycles);
+        many ? orb_cycles_generate(s, left, &cycles) : orb_cycles_find(s, INFINITY, ORB_CYCLES_LABELLED, NULL, &cycles);
     if (status == ORB_OK && many) {
       status = orb_cycles_apart(s, &cycles);
     }
@@ -304,6 +307,7 @@ orb_status orb_surface_list_handles(orb_surface *s, int64_t genus, orb_loops *ou
       status = list_round(s, &cycles, diagonal, &genus, out);
     }
     int32_t count = cycles.count;
+    left -= cycles.settled;
     orb_cycles_free(s->ctx, &cycles);
     ORB_TRY(status);
     if (count == 0) {

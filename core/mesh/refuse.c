@@ -251,9 +251,10 @@ orb_status orb_refuse_handles(orb_surface *s, int64_t genus, double limit) {
   }
   if (limit > 0) {
     (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
-                   "The surface has %lld %s that no loop of up to %.3g of its diagonal goes around. Allow more with "
-                   "handle_size, or fill or cut %s.",
-                   (long long)genus, plural(genus, "handle", "handles"), limit, plural(genus, "it", "them"));
+                   "The surface has %lld %s that no loop of up to %.3g of its diagonal goes around. %s %s.",
+                   (long long)genus, plural(genus, "handle", "handles"), limit,
+                   limit < ORB_HANDLE_SIZE_MOST ? "Allow more with handle_size, or fill or cut" : "Fill or cut",
+                   plural(genus, "it", "them"));
   } else {
     (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
                    "The surface has %lld %s (like a torus or a cup's ear); only surfaces like a sphere can be "

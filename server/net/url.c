@@ -4,6 +4,7 @@
 #include <curl/curl.h>
 #include <netinet/in.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -67,7 +68,8 @@ static net_verdict judge(CURLU *parts, const networks *allowed, net_url *out, co
       verdict = NET_URL_FORBIDDEN;
     } else if (curl_url_get(parts, CURLUPART_HOST, &host, 0) == CURLUE_OK && *host &&
                curl_url_get(parts, CURLUPART_PORT, &port, CURLU_DEFAULT_PORT) == CURLUE_OK &&
-               curl_url_get(parts, CURLUPART_URL, &whole, 0) == CURLUE_OK && strlen(whole) < sizeof out->text &&
+               strtol(port, NULL, 10) > 0 && curl_url_get(parts, CURLUPART_URL, &whole, 0) == CURLUE_OK &&
+               strlen(whole) < sizeof out->text &&
                snprintf(out->origin, sizeof out->origin, "%s://%s:%s", scheme, host, port) < (int)sizeof out->origin) {
       strcpy(out->text, whole);
       verdict = judge_host(host, out->plain, allowed, why);

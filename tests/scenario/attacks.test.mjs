@@ -12,11 +12,13 @@ import { gzipSync } from 'node:zlib';
 import * as attacks from './support/attacks.mjs';
 import { binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
 import { busy, megabytes, ownMegabytes, ownSeconds, workers, workSeconds } from './support/processes.mjs';
+import { wideDraco } from './support/draco.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const all = process.env.ORB_ATTACKS === 'all';
 const JOB_MEMORY = 128;
 const SECONDS_A_BYTE = 2e-6; // docs/limits.md
+const SECONDS_OF_LISTING = 4; // the loops of 2,400 handles: docs/limits.md
 const SECONDS_OF_OTHER = 0.1; // an upload and an embedding of the other tenant
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -115,12 +117,18 @@ const files = [
     all ? 'no-memory' : 'not-manifold',
     () => attacks.hugePolygon(all ? 5_000_000 : 800_000),
   ],
+  [
+    'primitives that have one Draco mesh with wide attributes',
+    'too-large',
+    async () => attacks.sharedDraco(await wideDraco(10_000, 120, 4)),
+  ],
+  ['a mesh of a long name that many nodes show', 'too-large', () => attacks.longName()],
 ];
 test('files that are made to cost much', async (t) => {
   const { d, evil, other } = await start(t);
   for (const [name, refused, make, packed] of files) {
     await t.test(name, async (t) => {
-      const file = make();
+      const file = await make();
       const body = packed ? gzipSync(file) : file;
       const headers = { ...evil, ...(packed && { 'content-encoding': 'gzip' }) };
       const upload = async () => {
@@ -134,6 +142,18 @@ test('files that are made to cost much', async (t) => {
       });
     });
   }
+});
+
+test('the loops of a refusal are listed in bounded time where vertices have many edges', async (t) => {
+  const { d, evil, other } = await start(t);
+  const file = attacks.soup();
+  const query = { repair: 'split_nonmanifold,fill_holes,largest_component' };
+  await beside(t, d, other, async () => {
+    const reply = await d.post('/v1/meshes', file, { headers: evil, query });
+    assert.equal(reply.json?.type, '/problems/not-genus-zero', `${reply.status} ${reply.bytes}`);
+    assert.ok(reply.json.loops.length > 0);
+    return file.length + SECONDS_OF_LISTING / SECONDS_A_BYTE;
+  });
 });
 
 test('the check of such a file ends with its client, and with the service', async (t) => {

@@ -232,6 +232,8 @@ static void malformed_urls(void **state) {
                                       "https://a b/",
                                       "https://[::1/",
                                       "https://a:99999/",
+                                      "https://a:0/",
+                                      "https://a:00/",
                                       "https://a\tb/"};
   networks none;
   net_url url;

@@ -183,6 +183,7 @@ static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *s
   ORB_TRY(orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch));
   t->hint.tells = count >= ORB_FIND_HINT_LEAST && *stretch < INFINITY;
   *stretch = t->hint.tells ? *stretch : 0;
+  t->hint.may_be_one_body = t->hint.tells && *stretch <= ORB_FIND_HINT_STRETCH_MOST;
   return ORB_OK;
 }
 
@@ -191,11 +192,12 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
   return !hint || stretch <= hint->sure || bend_of(one, 1) <= ORB_FIND_HINT_BEND;
 }
 
-/* Do landmarks leave open which limb is which? A few do: five along the middle of a spider say nothing of its legs.
- * More do not, even where shapes are unlike: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24
+/* Do landmarks leave open which limb is which, where trials bend the shapes much? A few do: five along the middle of a
+ * spider say nothing of its legs. So do more of them if they say that the shapes are one body: then no right trial
+ * bends it much. More of other shapes do not: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24
  * landmarks improved trials led to as much error. */
 static int leaves_limbs_open(const orb_hint_places *hint) {
-  return !hint->tells || hint->count < ORB_FIND_HINT_FEW;
+  return !hint->tells || hint->count < ORB_FIND_HINT_FEW || hint->may_be_one_body;
 }
 
 /* Improves trials that bend small copies much, unless landmarks say which limb is which. */

@@ -143,6 +143,7 @@ enum {
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);
 
 #define ORB_HANDLE_SIZE 0.05
+#define ORB_HANDLE_SIZE_MOST 10 /* that a request may allow, relative */
 
 typedef struct orb_repair_options {
   unsigned repair;

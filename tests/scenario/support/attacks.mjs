@@ -125,6 +125,45 @@ export function sharedIndices(indices = 2 << 20, primitives = 2000) {
   );
 }
 
+/** GLB with many primitives that have one compressed mesh. */
+export function sharedDraco(bytes, primitives = 200) {
+  const extensions = { KHR_draco_mesh_compression: { bufferView: 0, attributes: {} } };
+  return glb(
+    {
+      asset: { version: '2.0' },
+      buffers: [{ byteLength: bytes.length }],
+      bufferViews: [{ buffer: 0, byteLength: bytes.length }],
+      accessors: [{ componentType: 5125, count: 3, type: 'SCALAR' }],
+      meshes: [{ primitives: Array(primitives).fill({ attributes: {}, indices: 0, extensions }) }],
+    },
+    bytes,
+  );
+}
+
+/** glTF with one mesh of a long name, which many nodes show. */
+export function longName(length = 1_000_000, nodes = 90_000) {
+  const mesh = { name: 'x'.repeat(length), primitives: [] };
+  return Buffer.from(
+    JSON.stringify({ asset: { version: '2.0' }, meshes: [mesh], nodes: Array(nodes).fill({ mesh: 0 }) }),
+  );
+}
+
+/** OBJ with few vertices and many triangles: once it is split and filled, a surface with thousands of handles whose
+ * vertices have hundreds of edges. */
+export function soup(triangles = 100_000, vertices = 400) {
+  let seed = 1;
+  const random = (most) => {
+    seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
+    return Math.floor((seed / 2 ** 32) * most);
+  };
+  const lines = Array.from({ length: vertices }, () => `v ${random(1000)} ${random(1000)} ${random(1000)}\n`);
+  while (lines.length < vertices + triangles) {
+    const corners = [0, 1, 2].map(() => 1 + random(vertices));
+    if (new Set(corners).size === 3) lines.push(`f ${corners.join(' ')}\n`);
+  }
+  return Buffer.from(lines.join(''));
+}
+
 /** OBJ with one polygon: a star that runs around many times. */
 export function hugePolygon(corners = 5_000_000) {
   const star = 'v 3 0 0\nv 1 1 0\nv 0 3 0\nv -1 1 0\nv -3 0 0\nv -1 -1 0\nv 0 -3 0\nv 1 -1 0\nf';

@@ -107,6 +107,37 @@ export async function draco({ positions, triangles, colors, sets = {}, method = 
   };
 }
 
+/** Draco's bytes of a mesh of so many points and wide attributes, each of which has one value that differs: each attribute
+ * takes some thirty bytes, however many points and components it has. */
+export async function wideDraco(points, components, attributes) {
+  const { module } = await load(encoder);
+  const made = new module.Encoder();
+  const mesh = new module.Mesh();
+  const builder = new module.MeshBuilder();
+  builder.AddFacesToMesh(
+    mesh,
+    Math.ceil(points / 3),
+    new Uint32Array(3 * Math.ceil(points / 3)).map((_, i) => i % 3),
+  );
+  builder.AddFloatAttributeToMesh(
+    mesh,
+    module.POSITION,
+    points,
+    3,
+    new Float32Array(3 * points).map((_, i) => i),
+  );
+  for (let i = 0; i < attributes; i++) {
+    const values = new Int32Array(points * components);
+    values[5 * components] = 1;
+    builder.AddInt32Attribute(mesh, module.GENERIC, points, components, values);
+  }
+  made.SetEncodingMethod(module.MESH_SEQUENTIAL_ENCODING);
+  made.SetAttributeQuantization(module.POSITION, 16);
+  const out = new module.DracoInt8Array();
+  const length = made.EncodeMeshToDracoBuffer(mesh, out);
+  return Buffer.from(Array.from({ length }, (_, i) => out.GetValue(i) & 255));
+}
+
 /** The positions that a decoder reads, 3 per vertex, and the triangles. */
 export async function undraco(bytes, id) {
   const { module } = await load(path.join(folder, 'draco_decoder.js'));
