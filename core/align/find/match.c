@@ -193,8 +193,8 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
 }
 
 /* Do landmarks leave open which limb is which, where trials bend the shapes much? A few do: five along the middle of a
- * spider say nothing of its legs. So do more of them if they say that the shapes are one body: then no right trial
- * bends it much. More of other shapes do not: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24
+ * spider say nothing of its legs. So do more of them unless they exclude one body, which no right trial bends
+ * much. More of other shapes do not: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24
  * landmarks improved trials led to as much error. */
 static int leaves_limbs_open(const orb_hint_places *hint) {
   return !hint->tells || hint->count < ORB_FIND_HINT_FEW || hint->may_be_one_body;
