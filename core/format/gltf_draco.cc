@@ -31,15 +31,22 @@ struct Bound {
     reserves.back().reserve(bytes);
   }
 
-  /* Charges what is decoded and reserves what that takes. Returns whether both are granted. */
-  bool allows(size_t decoded, size_t taken) {
+  template <typename Ask>
+  bool grants(Ask ask) {
     try {
-      charge(decoded);
-      reserve(taken);
+      ask();
     } catch (...) {
       stopped = std::current_exception();
     }
     return !stopped;
+  }
+
+  /* Whether the file justifies so many decoded bytes, and whether there is room for what that takes. */
+  bool justifies(size_t decoded) {
+    return grants([&] { charge(decoded); });
+  }
+  bool has_room(size_t taken) {
+    return grants([&] { reserve(taken); });
   }
 };
 
@@ -80,21 +87,27 @@ class Bounded : public Method {
     const bool read = breaks_edges ? peek_edgebreaker(*this->buffer(), this->bitstream_version(), &faces, &seams)
                                    : peek_sequential(*this->buffer(), this->bitstream_version(), &faces);
     const size_t each = breaks_edges ? A_FACE + A_SEAM * static_cast<size_t>(seams) : A_LISTED_FACE;
-    return read && bound_->allows(size_product(faces, FACE), size_product(faces, each)) && Method::DecodeConnectivity();
+    return read && bound_->justifies(size_product(faces, FACE)) && bound_->has_room(size_product(faces, each)) &&
+           Method::DecodeConnectivity();
   }
 
   bool DecodeAllAttributes() override {
     const draco::PointCloud *cloud = this->point_cloud();
     const size_t points = cloud->num_points();
-    size_t decoded = 0, taken = 0;
+    size_t taken = 0; /* 13 times what is justified at most, so the sum does not overflow */
     for (int32_t i = 0; i < cloud->num_attributes(); i++) {
       const draco::PointAttribute *one = cloud->attribute(i);
-      const size_t width = static_cast<size_t>(one->num_components());
-      const size_t value = static_cast<size_t>(draco::DataTypeLength(one->data_type()));
-      decoded += size_product(points, width * value);
-      taken += size_product(points, width * (value + A_COMPONENT) + sizeof(uint32_t));
+      const int32_t width = one->num_components(), length = draco::DataTypeLength(one->data_type());
+      if (width < 1 || length < 1) {
+        return false;
+      }
+      const size_t components = static_cast<size_t>(width), value = static_cast<size_t>(length);
+      if (!bound_->justifies(size_product(points, components * value))) {
+        return false;
+      }
+      taken += size_product(points, components * (value + A_COMPONENT) + sizeof(uint32_t));
     }
-    return bound_->allows(decoded, taken) && Method::DecodeAllAttributes();
+    return bound_->has_room(taken) && Method::DecodeAllAttributes();
   }
 
  private:
