@@ -7,15 +7,28 @@
 #include <draco/compression/mesh/mesh_sequential_decoder.h>
 #include <draco/core/varint_decoding.h>
 
+#include <algorithm>
+#include <new>
+#include <stdexcept>
+
 namespace gltf {
 
 namespace {
 
-/* What Draco takes, in bytes: the largest table of its entropy coder (2^20 entries of 4 bytes), which a mesh of any
- * size may ask for; for each byte; for each face by either method, most of it in tables of corners, and for each face
- * and part of the attributes with seams of its own; and for each component of a value beside the value. Spheres of
- * 180,000 faces took 59 to 101 for each face beside their values, those of the sequential method up to 12. */
-const size_t TABLE = 4u << 20, A_BYTE = 16, A_FACE = 64, A_SEAM = 24, A_LISTED_FACE = 24, A_COMPONENT = 8;
+/* What Draco takes, in bytes: the table of its entropy coder that an encoder makes for 20 bits at most, which a mesh of
+ * any size may ask for; for each byte, of metadata and of what describes attributes; for each face and vertex by the
+ * method that breaks edges, and for each face by the other one; for each face and vertex once more for each part of the
+ * attributes with seams of its own; and for each component of a value beside the value. Measured: spheres of 180,000
+ * faces, 59 to 101 for each face beside their values; isolated faces, whose vertices are six times as many, 93, and 123
+ * for each part. */
+const size_t TABLE = 4u << 20, A_BYTE = 40, A_FACE = 64, A_VERTEX = 24, A_LISTED_FACE = 48, A_SEAM_FACE = 8,
+             A_SEAM_VERTEX = 44, A_COMPONENT = 8;
+
+/* Attributes of a mesh; glTF uses few. Looking one up takes a step for each. */
+const int32_t ATTRIBUTES_MOST = 256;
+
+/* Symbols of the entropy coder of listed faces. Encoders use 18 bits at most. */
+const uint32_t SYMBOLS_MOST = 1u << 18;
 
 const size_t FACE = 3 * sizeof(uint32_t); /* of what is decoded */
 
@@ -24,7 +37,7 @@ struct Bound {
   orb_context *ctx;
   const std::function<void(size_t)> &charge;
   std::vector<Counted<unsigned char>> &reserves;
-  std::exception_ptr stopped; /* no exception passes through Draco, which may be compiled without them */
+  std::exception_ptr stopped; /* the exception, which does not pass through Draco */
 
   void reserve(size_t bytes) {
     reserves.emplace_back(Charged<unsigned char>(ctx));
@@ -59,19 +72,33 @@ bool take_number(draco::DecoderBuffer *from, bool old, uint32_t *out) {
   return old ? from->Decode(out) : draco::DecodeVarint(out, from);
 }
 
-/* The number of faces, and of parts of the attributes with seams of their own, which an edgebreaker mesh begins with.
- */
-bool peek_edgebreaker(draco::DecoderBuffer from, uint16_t version, uint32_t *faces, uint8_t *seams) {
+/* What a mesh begins with. */
+struct Head {
+  uint32_t vertices = 0, faces = 0;
+  uint8_t seams = 0;    /* parts of the attributes with seams of their own */
+  uint32_t symbols = 0; /* of the entropy coder of listed faces; 0: they have none */
+};
+
+/* By the method that breaks edges. */
+bool peek_edgebreaker(draco::DecoderBuffer from, uint16_t version, Head *out) {
   const bool old = version < DRACO_BITSTREAM_VERSION(2, 0);
-  uint32_t vertices = 0;
-  if (version < DRACO_BITSTREAM_VERSION(2, 2) && !take_number(&from, old, &vertices)) {
+  if (version < DRACO_BITSTREAM_VERSION(2, 2) && !take_number(&from, old, &out->vertices)) {
     return false; /* vertices that were made */
   }
-  return take_number(&from, old, &vertices) && take_number(&from, old, faces) && from.Decode(seams);
+  return take_number(&from, old, &out->vertices) && take_number(&from, old, &out->faces) && from.Decode(&out->seams);
 }
 
-bool peek_sequential(draco::DecoderBuffer from, uint16_t version, uint32_t *faces) {
-  return take_number(&from, version < DRACO_BITSTREAM_VERSION(2, 2), faces);
+/* By the method that lists faces. The entropy coder has schemes; 1 is that of one table for all symbols. */
+bool peek_sequential(draco::DecoderBuffer from, uint16_t version, Head *out) {
+  const bool old = version < DRACO_BITSTREAM_VERSION(2, 2);
+  uint8_t compressed = 0, scheme = 0, bits = 0;
+  if (!take_number(&from, old, &out->faces) || !take_number(&from, old, &out->vertices) || !from.Decode(&compressed)) {
+    return false;
+  }
+  if (compressed != 0 || !from.Decode(&scheme) || scheme != 1) { /* 0 is the code of compressed faces */
+    return true;
+  }
+  return from.Decode(&bits) && take_number(&from, version < DRACO_BITSTREAM_VERSION(2, 0), &out->symbols);
 }
 
 template <class Method>
@@ -82,18 +109,33 @@ class Bounded : public Method {
  protected:
   bool DecodeConnectivity() override {
     const bool breaks_edges = std::is_same<Method, draco::MeshEdgebreakerDecoder>::value;
-    uint32_t faces = 0;
-    uint8_t seams = 0;
-    const bool read = breaks_edges ? peek_edgebreaker(*this->buffer(), this->bitstream_version(), &faces, &seams)
-                                   : peek_sequential(*this->buffer(), this->bitstream_version(), &faces);
-    const size_t each = breaks_edges ? A_FACE + A_SEAM * static_cast<size_t>(seams) : A_LISTED_FACE;
-    return read && bound_->justifies(size_product(faces, FACE)) && bound_->has_room(size_product(faces, each)) &&
-           Method::DecodeConnectivity();
+    Head head;
+    const bool read = breaks_edges ? peek_edgebreaker(*this->buffer(), this->bitstream_version(), &head)
+                                   : peek_sequential(*this->buffer(), this->bitstream_version(), &head);
+    const size_t faces = head.faces, seams = head.seams;
+    const size_t vertices = std::min(static_cast<size_t>(head.vertices), 3 * faces); /* Draco refuses more */
+    const size_t taken = breaks_edges ? size_product(faces, A_FACE + A_SEAM_FACE * seams) +
+                                            size_product(vertices, A_VERTEX + A_SEAM_VERTEX * seams)
+                                      : size_product(faces, A_LISTED_FACE);
+    return read && head.symbols <= SYMBOLS_MOST && bound_->justifies(size_product(faces, FACE + 4 * seams)) &&
+           bound_->has_room(taken) && Method::DecodeConnectivity();
+  }
+
+  /* Each of up to 255 decoders has a list as long as all attributes, each of which takes some bytes of the file. */
+  bool DecodePointAttributes() override {
+    draco::DecoderBuffer from = *this->buffer();
+    uint8_t decoders = 0;
+    return from.Decode(&decoders) &&
+           bound_->has_room(size_product(decoders, static_cast<size_t>(from.remaining_size()))) &&
+           Method::DecodePointAttributes();
   }
 
   bool DecodeAllAttributes() override {
     const draco::PointCloud *cloud = this->point_cloud();
     const size_t points = cloud->num_points();
+    if (cloud->num_attributes() > ATTRIBUTES_MOST) {
+      return false;
+    }
     size_t taken = 0; /* 13 times what is justified at most, so the sum does not overflow */
     for (int32_t i = 0; i < cloud->num_attributes(); i++) {
       const draco::PointAttribute *one = cloud->attribute(i);
@@ -119,10 +161,25 @@ class Bounded : public Method {
             status.error_msg_string().substr(0, 80));
 }
 
+/* What a decoded mesh takes. */
+size_t size_of(const draco::Mesh &mesh) {
+  size_t size = mesh.num_faces() * FACE;
+  for (int32_t i = 0; i < mesh.num_attributes(); i++) {
+    const draco::PointAttribute *one = mesh.attribute(i);
+    size += mesh.num_points() * (static_cast<size_t>(one->byte_stride()) + sizeof(uint32_t));
+  }
+  return size;
+}
+
 template <class Method>
 void decode_by(Bound *bound, draco::DecoderBuffer *buffer, draco::Mesh *out) {
   Bounded<Method> decoder(bound);
-  const draco::Status status = decoder.Decode(draco::DecoderOptions(), buffer, out);
+  draco::Status status;
+  try {
+    status = decoder.Decode(draco::DecoderOptions(), buffer, out);
+  } catch (const std::length_error &) { /* of a container that cannot be so long: the memory does not exist, either */
+    throw std::bad_alloc();
+  }
   if (bound->stopped) {
     std::rethrow_exception(bound->stopped);
   }
@@ -155,6 +212,8 @@ DracoMesh decode_draco(orb_context *ctx, Bytes bytes, const std::function<void(s
   } else {
     malformed("A glTF primitive (KHR_draco_mesh_compression) has an unknown method.");
   }
+  out.reserves.clear(); /* the decoder has gone; what is left is the mesh */
+  bound.reserve(size_of(*out.mesh));
   return out;
 }
 

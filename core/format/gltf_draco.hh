@@ -1,5 +1,7 @@
-/* Draco's decoder within bounds: it allocates nothing that the file's size does not justify, or that has no room in the
- * budget. Of Draco itself, a byte may ask for any amount of memory and time. */
+/* Draco's decoder within bounds: faces and values that the file's size does not justify, or that have no room in the
+ * budget, are refused before it allocates them. Of Draco itself, a byte may ask for any amount of memory and time. Only
+ * the tables of the entropy coder of values cannot be known before: up to 768 bytes for each byte of the file, which
+ * nothing but the limit of a process bounds. */
 #ifndef ORB_FORMAT_GLTF_DRACO_HH
 #define ORB_FORMAT_GLTF_DRACO_HH
 
@@ -19,8 +21,9 @@ struct DracoMesh {
   std::unique_ptr<draco::Mesh> mesh;
 };
 
-/* Decodes a mesh. charge(bytes): called with what it holds before memory is taken for that; it throws if that is too
- * much. O(bytes + what was charged). */
+/* Decodes a mesh. charge(bytes): called with what it holds, and with four bytes for each face and part of the
+ * attributes with seams of its own, before memory is taken for that; it throws if that is too much. O(bytes + what was
+ * charged). */
 DracoMesh decode_draco(orb_context *ctx, Bytes bytes, const std::function<void(size_t)> &charge);
 
 }  // namespace gltf

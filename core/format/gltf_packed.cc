@@ -9,8 +9,8 @@ namespace {
 /* Compressed meshes are 3 to 30 times smaller; a run of equal bytes may be much more. */
 const size_t GROWTH_MAX = 200, SMALL = 1u << 20;
 
-/* What looking up the members of a compressed primitive counts as, in bytes. */
-const size_t PRIMITIVE = 1024;
+/* What looking up the members of a compressed primitive, and an attribute of its mesh, counts as, in bytes. */
+const size_t PRIMITIVE = 1024, MEMBER = 1024;
 
 const cJSON *extension_of(const cJSON *object, const char *name) {
   return member(member(object, "extensions"), name);
@@ -79,11 +79,15 @@ const Packed::Values *Packed::accessor(int64_t index) const {
   return found == accessors_.end() ? nullptr : &found->second;
 }
 
-void Packed::charge(size_t bytes) {
-  if (bytes > left_) {
+void Packed::spend(size_t *left, size_t bytes) {
+  if (bytes > *left) {
     throw Fault{ORB_E_TOO_LARGE, "The compressed glTF file holds more than its size justifies."};
   }
-  left_ -= bytes;
+  *left -= bytes;
+}
+
+void Packed::charge(size_t bytes) {
+  spend(&left_, bytes);
 }
 
 /* https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/EXT_meshopt_compression */
@@ -125,7 +129,8 @@ void Packed::load_view(int64_t index, const cJSON *extension, Bytes bytes) {
 const draco::Mesh &Packed::mesh_of(int64_t view, Bytes bytes) {
   auto found = meshes_.find(view);
   if (found == meshes_.end()) {
-    found = meshes_.emplace(view, decode_draco(ctx_, bytes, [this](size_t decoded) { charge(decoded); })).first;
+    found = meshes_.emplace(view, decode_draco(ctx_, bytes, [this](size_t decoded) { spend(&decoded_left_, decoded); }))
+                .first;
   }
   return *found->second.mesh;
 }
@@ -135,6 +140,8 @@ void Packed::load_primitive(const List &accessors, const cJSON *primitive, const
                             const draco::Mesh &mesh) {
   const cJSON *attributes = member(primitive, "attributes"), *ids = member(extension, "attributes");
   for (const cJSON *id = cJSON_IsObject(ids) ? ids->child : nullptr; id; id = id->next) {
+    charge(MEMBER);
+    must(orb_context_check(ctx_));
     int64_t index = whole(attributes, id->string, NONE);
     const draco::PointAttribute *attribute =
         mesh.GetAttributeByUniqueId(static_cast<uint32_t>(whole(ids, id->string, 0)));
@@ -200,7 +207,7 @@ void Packed::load_primitives(const cJSON *doc, const std::function<Bytes(int64_t
 
 void Packed::load(const cJSON *doc, const std::function<Bytes(int64_t)> &buffer,
                   const std::function<Bytes(int64_t)> &view, size_t file_size) {
-  left_ = SMALL + GROWTH_MAX * file_size;
+  left_ = decoded_left_ = SMALL + GROWTH_MAX * file_size;
   const List views = array_of(doc, "bufferViews");
   for (size_t i = 0; i < views.size(); i++) {
     if (const cJSON *extension = extension_of(views[i], MESHOPT)) {

@@ -52,12 +52,14 @@ class Packed {
   void load_primitive(const List &accessors, const cJSON *primitive, const cJSON *extension, const draco::Mesh &mesh);
   const draco::Mesh &mesh_of(int64_t view, Bytes bytes);
   void charge(size_t bytes);
+  static void spend(size_t *left, size_t bytes);
 
   orb_context *ctx_;
   std::map<int64_t, Octets> views_;
   std::map<int64_t, Values> accessors_;
   std::map<int64_t, DracoMesh> meshes_; /* of views that primitives still have to load */
-  size_t left_ = 0;                     /* bytes that may still be decoded */
+  size_t left_ = 0;                     /* bytes of views and accessors that may still be decoded */
+  size_t decoded_left_ = 0;             /* the same of Draco's meshes, before their values become those of accessors */
 };
 
 /* Whether a buffer stands for the uncompressed data only and has no bytes. */

@@ -82,7 +82,7 @@ static int32_t search(work *w, int32_t seed, int64_t most, double *length) {
         *length = distance + w->p.distance[to];
         closing = h;
       }
-      edges++;
+      edges += vertices > 1; /* each search may begin at a pole */
       h = w->p.s->twin[orb_prev(h)];
     } while (h != w->p.corner[v]);
     w->settled = larger(vertices, edges / EDGES_A_VERTEX);

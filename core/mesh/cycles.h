@@ -37,7 +37,7 @@ ORB_MUST_CHECK orb_status orb_cycles_find(orb_surface *surface, double limit, in
 
 /* Finds as many cycles of any length as share no vertex, shortest first, among those of generators and of searches near
  * them. Each leaves the surface connected; orb_cycles_apart() keeps those that do so together. settled: vertices that
- * the searches may settle, but each some. O(F log F + their total length). */
+ * the searches may settle, but 64 each. O(F log F + their total length). */
 ORB_MUST_CHECK orb_status orb_cycles_generate(orb_surface *surface, int64_t settled, orb_cycles *out);
 
 void orb_cycles_free(orb_context *ctx, orb_cycles *cycles);

@@ -122,6 +122,8 @@ const files = [
     'too-large',
     async () => attacks.sharedDraco(await wideDraco(10_000, 120, 4)),
   ],
+  ['a Draco mesh of 2^27 faces that break edges', 'too-large', () => attacks.sharedDraco(attacks.manyFaces(1), 1)],
+  ['a Draco mesh of 2^27 faces that are listed', 'too-large', () => attacks.sharedDraco(attacks.manyFaces(0), 1)],
   ['a mesh of a long name that many nodes show', 'too-large', () => attacks.longName()],
 ];
 test('files that are made to cost much', async (t) => {

@@ -55,6 +55,23 @@ test('Draco-compressed glTF is read, and damaged data is refused', { skip: !exis
     assert.ok([200, 201, 400, 413, 422].includes((await d.upload(damaged)).status), `damage ${k}`);
   }
   assertProblem(await d.upload(glb.subarray(0, at + length / 2)), 400, 'malformed-mesh');
+  // two meshes that have one compressed mesh, with accessors of their own
+  const twice = await draco({
+    ...egg,
+    edit: (json) => {
+      const [only] = json.meshes[0].primitives;
+      json.accessors.push(...structuredClone(json.accessors));
+      json.meshes.push({ primitives: [{ ...only, attributes: { POSITION: 2 }, indices: 3 }] });
+      json.nodes.push({ ...json.nodes[0], mesh: 1, translation: [100, 0, 0] });
+      json.scenes[0].nodes.push(1);
+    },
+  });
+  const two = await d.upload(twice.glb);
+  assertProblem(two, 422, 'not-connected');
+  assert.deepEqual(
+    two.json.parts.map((part) => part.triangles),
+    [egg.triangles.length, egg.triangles.length],
+  );
 });
 
 // A box of 1 × 2 × 3 cm in two materials, in a component that doubles it and moves it by 5 cm, written by lib3mf 1.8.1.

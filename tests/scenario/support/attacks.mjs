@@ -140,6 +140,13 @@ export function sharedDraco(bytes, primitives = 200) {
   );
 }
 
+/** Draco's bytes of a mesh that says it has 2^27 faces, by the method that breaks edges (1) or lists faces (0). */
+export function manyFaces(method) {
+  const faces = [0x80, 0x80, 0x80, 0x40]; // 2^27 in groups of seven bits, the lowest first
+  const rest = method ? [0, 3, ...faces, 0, 1] : [...faces, 3, 0];
+  return Buffer.concat([Buffer.from('DRACO'), Buffer.from([2, 2, 1, method, 0, 0, ...rest]), Buffer.alloc(64)]);
+}
+
 /** glTF with one mesh of a long name, which many nodes show. */
 export function longName(length = 1_000_000, nodes = 90_000) {
   const mesh = { name: 'x'.repeat(length), primitives: [] };
