@@ -18,8 +18,7 @@ static const struct {
              {"split_nonmanifold", ORB_REPAIR_SPLIT}};
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
-/* The least size is a float's rounding: no loop is shorter. The most is a path from end to end and back, with room for
- * detours: none is longer. */
+/* A float's rounding: no loop is shorter. */
 static const double HANDLE_SIZE_LEAST = 1e-6;
 
 /* Refuses the value of a query parameter; returns 0. */

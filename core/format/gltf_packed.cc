@@ -10,7 +10,7 @@ namespace {
 const size_t GROWTH_MAX = 200, SMALL = 1u << 20;
 
 /* What looking up the members of a compressed primitive, and an attribute of its mesh, counts as, in bytes. */
-const size_t PRIMITIVE = 1024, MEMBER = 1024;
+const size_t LOOK_UP = 1024;
 
 const cJSON *extension_of(const cJSON *object, const char *name) {
   return member(member(object, "extensions"), name);
@@ -140,7 +140,7 @@ void Packed::load_primitive(const List &accessors, const cJSON *primitive, const
                             const draco::Mesh &mesh) {
   const cJSON *attributes = member(primitive, "attributes"), *ids = member(extension, "attributes");
   for (const cJSON *id = cJSON_IsObject(ids) ? ids->child : nullptr; id; id = id->next) {
-    charge(MEMBER);
+    charge(LOOK_UP);
     must(orb_context_check(ctx_));
     int64_t index = whole(attributes, id->string, NONE);
     const draco::PointAttribute *attribute =
@@ -196,7 +196,7 @@ void Packed::load_primitives(const cJSON *doc, const std::function<Bytes(int64_t
   for_compressed(doc, [&](const cJSON *, const cJSON *extension) { uses[whole(extension, "bufferView", NONE)]++; });
   for_compressed(doc, [&](const cJSON *primitive, const cJSON *extension) {
     const int64_t index = whole(extension, "bufferView", NONE);
-    charge(PRIMITIVE);
+    charge(LOOK_UP);
     load_primitive(accessors, primitive, extension, mesh_of(index, view(index)));
     if (--uses[index] == 0) {
       meshes_.erase(index);

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/grow.h"
 #include "base/memory.h"
 
 /* Takes bytes from the front. bad: something was wrong, and all later reads give zeros. */
@@ -49,14 +50,7 @@ static void *take_array(orb_context *ctx, reader *r, size_t count, size_t size) 
 static int grow(orb_context *ctx, void *array, size_t count, size_t size) {
   void *block;
   memcpy(&block, array, sizeof block);
-  if (block) {
-    block = orb_realloc(ctx, block, count, size);
-    if (!block) {
-      return 0;
-    }
-    memcpy(array, &block, sizeof block);
-  }
-  return 1;
+  return !block || orb_regrow(ctx, array, count, size);
 }
 
 static int grow_mesh(orb_context *ctx, orb_mesh *mesh, int32_t vertices, int32_t triangles) {

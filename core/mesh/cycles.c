@@ -28,10 +28,10 @@ enum { NEAR_VERTICES = 6000000, NEAR_LEAST = 64 };
  * others cost little, so each seed has its own. SLACK: how much longer than need be a long loop may become, relative.
  * The larger, the fewer searches: their number along a line of seeds is the line's length over half of it. */
 enum { LONG_SEARCH = 256 };
+static const double SLACK = 0.125;
 /* A vertex of more edges than this counts as several settled ones: of a file of few vertices and many faces, each
  * vertex has thousands. Twice the mean of a closed surface, so that others count as one. */
 enum { EDGES_A_VERTEX = 12 };
-static const double SLACK = 0.125;
 enum { ROUND = 2 };                  /* what labels and a cut cost, in settled vertices for each triangle */
 enum { GENERATORS_MOST = 16000000 }; /* edges of all generators that are kept beside those searches: 64 MB */
 enum { CHECK_EVERY = 256, SETTLED_EVERY = 65536 }; /* cycles and settled vertices between looks at the deadline */

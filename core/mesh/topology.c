@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/forest.h"
 #include "base/memory.h"
 #include "mesh/surface.h"
 
@@ -17,9 +18,7 @@ static orb_status count_fans(orb_surface *s, orb_topology *out, int64_t *used) {
     orb_free(s->ctx, fans);
     return ORB_E_NO_MEMORY;
   }
-  for (int32_t h = 0; h < half_edges; h++) {
-    root[h] = h;
-  }
+  orb_forest_plant(root, half_edges);
   for (int32_t h = 0; h < half_edges; h++) {
     int32_t g = s->twin[h];
     if (g <= h) {
@@ -28,13 +27,7 @@ static orb_status count_fans(orb_surface *s, orb_topology *out, int64_t *used) {
     for (int end = 0; end < 2; end++) {
       int32_t a = end ? orb_next(h) : h;
       int32_t b = mesh->triangles[g] == mesh->triangles[a] ? g : orb_next(g);
-      while (root[a] != a) {
-        a = root[a] = root[root[a]];
-      }
-      while (root[b] != b) {
-        b = root[b] = root[root[b]];
-      }
-      root[a < b ? b : a] = a < b ? a : b;
+      orb_forest_join(root, a, b);
     }
   }
   for (int32_t h = 0; h < half_edges; h++) {
@@ -63,20 +56,14 @@ static orb_status count_loops(orb_surface *s, int64_t *loops) {
     if (s->twin[h] != ORB_OPEN) {
       continue;
     }
-    int32_t end[2] = {mesh->triangles[h], mesh->triangles[orb_next(h)]};
+    const int32_t end[2] = {mesh->triangles[h], mesh->triangles[orb_next(h)]};
     for (int i = 0; i < 2; i++) {
       if (root[end[i]] < 0) {
         root[end[i]] = end[i];
         vertices++;
       }
-      while (root[end[i]] != end[i]) {
-        end[i] = root[end[i]] = root[root[end[i]]];
-      }
     }
-    if (end[0] != end[1]) {
-      root[end[0] < end[1] ? end[1] : end[0]] = end[0] < end[1] ? end[0] : end[1];
-      joins++;
-    }
+    joins += orb_forest_join(root, end[0], end[1]);
   }
   *loops = vertices - joins;
   orb_free(s->ctx, root);

@@ -21,9 +21,8 @@ typedef struct orb_hint_places {
   int32_t count, few, trusted;
   int tells; /* 1: their distances tell whether the shapes are one body. Otherwise they only exclude and draw maps. The
                 caller's to set */
-  int may_be_one_body; /* 1: they do not exclude it. The caller's to set, too */
-  int32_t *vertex[2];  /* the nearest vertex of the copy */
-  double *at[2];       /* the landmark, in the copy's space */
+  int32_t *vertex[2]; /* the nearest vertex of the copy */
+  double *at[2];      /* the landmark, in the copy's space */
 } orb_hint_places;
 
 /* Finds the places. at[2]: where the landmarks lie in the copies' spaces, 3 each; `out` takes ownership of both, also

@@ -183,7 +183,6 @@ static orb_status take_hint(orb_trials *t, const orb_match_hint *hint, double *s
   ORB_TRY(orb_hint_stretch(t->ctx, &t->hint, t->copy, stretch));
   t->hint.tells = count >= ORB_FIND_HINT_LEAST && *stretch < INFINITY;
   *stretch = t->hint.tells ? *stretch : 0;
-  t->hint.may_be_one_body = t->hint.tells && *stretch <= ORB_FIND_HINT_STRETCH_MOST;
   return ORB_OK;
 }
 
@@ -196,13 +195,13 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
  * spider say nothing of its legs. So do more of them unless they exclude one body, which no right trial bends
  * much. More of other shapes do not: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24
  * landmarks improved trials led to as much error. */
-static int leaves_limbs_open(const orb_hint_places *hint) {
-  return !hint->tells || hint->count < ORB_FIND_HINT_FEW || hint->may_be_one_body;
+static int leaves_limbs_open(const orb_hint_places *hint, int is_unlike) {
+  return !is_unlike || hint->count < ORB_FIND_HINT_FEW;
 }
 
 /* Improves trials that bend small copies much, unless landmarks say which limb is which. */
-static orb_status improve_trials(orb_trials *small) {
-  if (!leaves_limbs_open(&small->hint) || !orb_trials_bend_much(small)) {
+static orb_status improve_trials(orb_trials *small, int is_unlike) {
+  if (!leaves_limbs_open(&small->hint, is_unlike) || !orb_trials_bend_much(small)) {
     return ORB_OK;
   }
   ORB_TRY(orb_trials_branch(small));
@@ -235,8 +234,8 @@ static orb_status rank_raised(orb_trials *t, int bends_little) {
   return are_of_one_body(t) ? rank_with_coarse(t) : ORB_OK;
 }
 
-/* Makes trials of small copies, raises the best of them, and ranks these. */
-static orb_status fill_trials(orb_trials *t) {
+/* Makes trials of small copies, raises the best of them, and ranks these. is_unlike: that of the match. */
+static orb_status fill_trials(orb_trials *t, int is_unlike) {
   orb_status status = ORB_E_NO_MEMORY;
   orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
   if (!small) {
@@ -247,7 +246,7 @@ static orb_status fill_trials(orb_trials *t) {
   ORB_GO(status, orb_trials_make(small), end);
   ORB_GO(status, orb_trials_rank(small), end);
   const int bends_little = orb_trials_bend(small) <= ORB_FIND_COARSE_TOO;
-  ORB_GO(status, improve_trials(small), end);
+  ORB_GO(status, improve_trials(small, is_unlike), end);
   ORB_GO(status, orb_trials_raise(small, t), end);
   ORB_GO(status, rank_raised(t, bends_little), end);
   if (t->hint.count == 0) { /* landmarks draw the best trial along its map, which crossing does not change */
@@ -295,7 +294,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
     return ORB_OK;
   }
   if (t->count == 0) {
-    ORB_TRY(fill_trials(t));
+    ORB_TRY(fill_trials(t, out->is_unlike));
   }
   int32_t best = orb_trials_best(t);
   if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {

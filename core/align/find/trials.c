@@ -68,7 +68,6 @@ static orb_status copy_hint(const orb_trials *coarse, orb_trials *small) {
   }
   ORB_TRY(orb_hint_places_create(small->ctx, from->count, from->few, from->trusted, at, small->copy, &small->hint));
   small->hint.tells = from->tells;
-  small->hint.may_be_one_body = from->may_be_one_body;
   return ORB_OK;
 }
 

@@ -143,7 +143,8 @@ enum {
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);
 
 #define ORB_HANDLE_SIZE 0.05
-#define ORB_HANDLE_SIZE_MOST 10 /* that a request may allow, relative */
+/* The most that a request may allow: a path from end to end of the mesh and back, with room for detours. */
+#define ORB_HANDLE_SIZE_MOST 10
 
 typedef struct orb_repair_options {
   unsigned repair;

@@ -17,6 +17,12 @@ async function load(file) {
   return new Promise((resolve) => loaded.exports({ onModuleLoaded: (module) => resolve({ module }) }));
 }
 
+function encoded(module, made, mesh) {
+  const out = new module.DracoInt8Array();
+  const length = made.EncodeMeshToDracoBuffer(mesh, out);
+  return Buffer.from(Array.from({ length }, (_, i) => out.GetValue(i) & 255));
+}
+
 /**
  * A GLB of one primitive compressed with Google's Draco encoder. colors: four bytes per vertex. sets: attributes by
  * name, {rows, componentType, normalized} with floats, bytes or 16-bit numbers. method: of the encoder. edit(json)
@@ -51,9 +57,8 @@ export async function draco({ positions, triangles, colors, sets = {}, method = 
   }
   made.SetEncodingMethod(module[`MESH_${method}_ENCODING`]);
   made.SetAttributeQuantization(module.POSITION, 14);
-  const out = new module.DracoInt8Array();
-  const length = made.EncodeMeshToDracoBuffer(mesh, out);
-  const bytes = Buffer.from(Array.from({ length }, (_, i) => out.GetValue(i) & 255));
+  const bytes = encoded(module, made, mesh);
+  const { length } = bytes;
   const range = (pick) => [0, 1, 2].map((k) => pick(...positions.map((p) => p[k])));
   const json = {
     asset: { version: '2.0' },
@@ -133,9 +138,7 @@ export async function wideDraco(points, components, attributes) {
   }
   made.SetEncodingMethod(module.MESH_SEQUENTIAL_ENCODING);
   made.SetAttributeQuantization(module.POSITION, 16);
-  const out = new module.DracoInt8Array();
-  const length = made.EncodeMeshToDracoBuffer(mesh, out);
-  return Buffer.from(Array.from({ length }, (_, i) => out.GetValue(i) & 255));
+  return encoded(module, made, mesh);
 }
 
 /** The positions that a decoder reads, 3 per vertex, and the triangles. */
