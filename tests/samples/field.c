@@ -56,37 +56,98 @@ double sample_distance(const orb_primitive *primitive, const double p[3]) {
   return primitive->kind == SAMPLE_CONE ? cone(primitive, p) : ellipsoid(primitive, p);
 }
 
-double sample_field(const orb_animal *animal, const double p[3]) {
+/* Which parts the field near a place depends on. Distances change by no more than places do, so a part that is far from
+ * a place where another one is near changes nothing around it: unions blend only what is nearly as near. Distances to
+ * ellipsoids are of first order, so their parts always count. */
+enum { PARTS_MOST = 64 };
+
+typedef struct vicinity {
+  double middle[3];
+  int part_count;
+  unsigned char skips[PARTS_MOST];
+} vicinity;
+
+static const double VICINITY = 0.05, BLEND_MOST = 0.15; /* its radius; of parts into the body. In units of the sample */
+
+static double field_in(const orb_animal *animal, const vicinity *near, const double p[3]) {
   double whole = 1e9, part = 1e9, part_blend = 0;
+  int number = -1, skips = 0;
   for (size_t i = 0; i < animal->primitive_count; i++) {
     const orb_primitive *o = &animal->primitives[i];
-    double d = sample_distance(o, p);
     if (o->begins_part) {
       whole = smooth_union(whole, part, part_blend);
-      part = d;
+      part = 1e9;
       part_blend = o->blend;
-    } else {
-      part = smooth_union(part, d, o->blend);
+      number++;
+      skips = number < near->part_count && near->skips[number];
     }
+    if (!skips)
+      part = smooth_union(part, sample_distance(o, p), o->begins_part ? 0 : o->blend);
   }
   return smooth_union(whole, part, part_blend);
 }
 
-void sample_gradient(const orb_animal *animal, const double p[3], double out[3]) {
+double sample_field(const orb_animal *animal, const double p[3]) {
+  const vicinity all = {.part_count = 0};
+  return field_in(animal, &all, p);
+}
+
+static void find_vicinity(const orb_animal *animal, const double p[3], vicinity *out) {
+  double value[PARTS_MOST], least = 1e9;
+  int count = 0;
+  for (int k = 0; k < 3; k++)
+    out->middle[k] = p[k];
+  for (size_t i = 0; i < animal->primitive_count; i++) {
+    const orb_primitive *o = &animal->primitives[i];
+    if (o->begins_part) {
+      if (count == PARTS_MOST)
+        break;
+      value[count++] = 1e9;
+    }
+    if (count == 0)
+      continue;
+    double *part = &value[count - 1];
+    *part = o->kind == SAMPLE_CONE ? smooth_union(*part, sample_distance(o, p), o->begins_part ? 0 : o->blend) : -1e9;
+    if (*part > -1e8 && *part < least)
+      least = *part;
+  }
+  out->part_count = count;
+  for (int k = 0; k < count; k++)
+    out->skips[k] = value[k] > least + 2 * VICINITY + 2 * BLEND_MOST;
+}
+
+static int is_outside(const vicinity *near, const double p[3]) {
+  double d[3];
+  for (int k = 0; k < 3; k++)
+    d[k] = p[k] - near->middle[k];
+  return dot(d, d) > VICINITY * VICINITY / 4;
+}
+
+static void gradient_in(const orb_animal *animal, const vicinity *near, const double p[3], double out[3]) {
   const double step = 1e-4;
   for (int k = 0; k < 3; k++) {
     double q[3] = {p[0], p[1], p[2]};
     q[k] = p[k] + step;
-    double above = sample_field(animal, q);
+    double above = field_in(animal, near, q);
     q[k] = p[k] - step;
-    out[k] = (above - sample_field(animal, q)) / (2 * step);
+    out[k] = (above - field_in(animal, near, q)) / (2 * step);
   }
 }
 
+void sample_gradient(const orb_animal *animal, const double p[3], double out[3]) {
+  vicinity near;
+  find_vicinity(animal, p, &near);
+  gradient_in(animal, &near, p, out);
+}
+
 void sample_project(const orb_animal *animal, double p[3]) {
+  vicinity near;
+  find_vicinity(animal, p, &near);
   for (int round = 0; round < 6; round++) {
-    double gradient[3], f = sample_field(animal, p);
-    sample_gradient(animal, p, gradient);
+    if (is_outside(&near, p))
+      find_vicinity(animal, p, &near);
+    double gradient[3], f = field_in(animal, &near, p);
+    gradient_in(animal, &near, p, gradient);
     double g2 = dot(gradient, gradient);
     if (g2 < 1e-4)
       return;
