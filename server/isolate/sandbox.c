@@ -72,11 +72,11 @@ int sandbox_prepare(void) {
   /* Only memory that runs no code, and that RLIMIT_DATA counts: it does not count what is shared, grows like a stack,
    * or was written to and can be read only. For the same reason no file in memory can be created: RLIMIT_FSIZE limits
    * each by itself. */
-  fine =
-      fine &&
-      seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mmap), 2, SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0),
-                       SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_TYPE | MAP_GROWSDOWN, MAP_PRIVATE)) == 0 &&
-      seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mprotect), 1, SCMP_A2(SCMP_CMP_EQ, PROT_READ | PROT_WRITE)) == 0;
+  fine = fine &&
+         seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mmap), 2, SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0),
+                          SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_TYPE | MAP_GROWSDOWN, MAP_PRIVATE)) == 0 &&
+         seccomp_rule_add(rules, SCMP_ACT_ALLOW, SCMP_SYS(mprotect), 1,
+                          SCMP_A2(SCMP_CMP_EQ, PROT_READ | PROT_WRITE, 0)) == 0;
   /* Threads, but no processes. The flags of clone3() lie in memory, which a filter cannot read: ENOSYS makes the C
    * library use clone(). */
   fine = fine &&

@@ -260,7 +260,7 @@ static void a_lift_keeps_the_map_of_the_copy(void **state) {
     twist(fixed.points + 3 * (size_t)copy->vertex[v], copy->points + 3 * (size_t)v);
   }
   const orb_map_guide guide = {.from = ORB_MAP_FROM_COPY,
-                               .copy = {copy->mesh.vertex_count, copy->vertex, copy->points, &one->hierarchy}};
+                               .copy = {copy->mesh.vertex_count, copy->vertex, copy->points, &one->hierarchy, 0}};
   assert_int_equal(orb_compose(s.ctx, &fixed, &one->whole, 0, 0, &guide, ORB_PRESET_DEFAULT, energy, &improved),
                    ORB_OK);
   assert_true(improved);
