@@ -7,6 +7,7 @@ import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
 import { binaries, daemon, endless, patience } from './support/daemon.mjs';
 import { preload } from './support/preload.mjs';
+import { pause } from './support/processes.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const library = process.env.ORB_CLOCK;
@@ -24,6 +25,7 @@ test('waits end and slow clients are disconnected even if the clock is set back'
   const { id } = (await d.upload(shapes.binaryPly(shapes.ball(5)))).json;
   const job = (await d.post('/v1/embeddings', { mesh: id, ...endless })).json;
   const early = Date.parse(job.created);
+  await pause(d, job);
   await sleep(ahead + 1000);
   assert.ok(early > Date.now() + 3_000_000, 'the clock was ahead');
   const late = await d.upload(shapes.tetrahedron);
@@ -69,6 +71,7 @@ test('a clock that is set ahead ends tokens, and no job and no wait', {
   const { id } = (await d.post('/v1/meshes', shapes.binaryPly(shapes.ball(5)), own)).json;
   const job = (await d.post('/v1/embeddings', { mesh: id, ...endless }, brief)).json;
   assert.ok(Date.parse(job.created) < Date.now() - 3_000_000, 'the clock was behind');
+  await pause(d, job, own);
   const seconds = 12; // the jump is within them
   const waited = await d.get(job.url, { ...own, query: { wait: seconds } });
   assert.deepEqual([waited.status, waited.json.state], [200, 'running'], waited.bytes.toString());
