@@ -8,7 +8,10 @@ export function toTriangle(p, a, b, c) {
   const ab = sub(b, a);
   const ac = sub(c, a);
   const ap = sub(p, a);
-  const at = (s, t) => Math.hypot(...[0, 1, 2].map((k) => ap[k] - s * ab[k] - t * ac[k]));
+  const at = (s, t) => {
+    const d = [ap[0] - s * ab[0] - t * ac[0], ap[1] - s * ab[1] - t * ac[1], ap[2] - s * ab[2] - t * ac[2]];
+    return Math.sqrt(dot(d, d));
+  };
   const d1 = dot(ab, ap);
   const d2 = dot(ac, ap);
   if (d1 <= 0 && d2 <= 0) return at(0, 0);
