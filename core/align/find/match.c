@@ -8,6 +8,7 @@
 #include "align/find/extended.h"
 #include "align/find/hinted.h"
 #include "align/find/mirrored.h"
+#include "align/find/open_limbs.h"
 #include "align/find/params.h"
 #include "align/find/raised.h"
 #include "align/find/trials.h"
@@ -192,16 +193,28 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
 }
 
 /* Do landmarks leave open which limb is which, where trials bend the shapes much? A few do: five along the middle of a
- * spider say nothing of its legs. So do more of them unless they exclude one body, which no right trial bends
- * much. More of other shapes do not: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24
- * landmarks improved trials led to as much error. */
-static int leaves_limbs_open(const orb_hint_places *hint, int is_unlike) {
-  return !is_unlike || hint->count < ORB_FIND_HINT_FEW;
+ * spider say nothing of its legs. So do more of them that lie near no tip of several limbs, unless they exclude one
+ * body, which no right trial bends much. More of other shapes do not: of 83 pairs of animals of other kinds (seed 31),
+ * with 8 and with 24 landmarks improved trials led to as much error. */
+static orb_status leave_limbs_open(const orb_trials *small, int is_unlike, int *open) {
+  int32_t limbs;
+  *open = small->hint.count < ORB_FIND_HINT_FEW;
+  if (*open || is_unlike) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_open_limbs(small, &limbs));
+  *open = limbs >= ORB_FIND_HINT_OPEN;
+  return ORB_OK;
 }
 
 /* Improves trials that bend small copies much, unless landmarks say which limb is which. */
 static orb_status improve_trials(orb_trials *small, int is_unlike) {
-  if (!leaves_limbs_open(&small->hint, is_unlike) || !orb_trials_bend_much(small)) {
+  int is_open;
+  if (!orb_trials_bend_much(small)) {
+    return ORB_OK;
+  }
+  ORB_TRY(leave_limbs_open(small, is_unlike, &is_open));
+  if (!is_open) {
     return ORB_OK;
   }
   ORB_TRY(orb_trials_branch(small));

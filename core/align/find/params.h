@@ -322,12 +322,16 @@ static const double ORB_FIND_DIFFERENT = 0.15;
 /* Matches that must agree with landmarks (hint.c). */
 
 enum {
-  ORB_FIND_HINT_LEAST = 4,  /* landmarks; fewer do not tell a pose from other proportions */
-  ORB_FIND_HINT_FEW = 8,    /* landmarks that a match must agree with: as many as a body has tips. Fewer leave open
-                               where its limbs go. With 4 or 24 at
-                               first, a third of the pairs folded */
-  ORB_FIND_HINT_SOURCES = 6 /* landmarks from which distances are measured; each takes 1 ms */
+  ORB_FIND_HINT_LEAST = 4,   /* landmarks; fewer do not tell a pose from other proportions */
+  ORB_FIND_HINT_FEW = 8,     /* landmarks that a match must agree with: as many as a body has tips. Fewer leave open
+                                where its limbs go. With 4 or 24 at
+                                first, a third of the pairs folded */
+  ORB_FIND_HINT_SOURCES = 6, /* landmarks from which distances are measured; each takes 1 ms */
+  ORB_FIND_HINT_OPEN = 2     /* limbs without a landmark that leave open which is which; one has only one place to go */
 };
+/* A landmark tells of a limb whose tip lies this near along the surface: the length of a foot and a shank. In radii of
+ * a ball of the shape's area. */
+static const double ORB_FIND_HINT_TELLS = 0.6;
 /* Shorter distances are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.
  */
 static const double ORB_FIND_HINT_FAR = 0.5;
