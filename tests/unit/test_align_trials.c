@@ -10,6 +10,7 @@
 #include "align/find/crossed.h"
 #include "align/find/extended.h"
 #include "align/find/hinted.h"
+#include "align/find/open_limbs.h"
 #include "align/find/raised.h"
 #include "align/find/tips.h"
 #include "align/rotate/procrustes.h"
@@ -64,6 +65,28 @@ static void limbs_end_in_tips(void **state) {
     }
   }
   scene_close(&s);
+}
+
+/* A limb is open unless a landmark lies at its end, on both shapes. */
+static void limbs_without_landmarks_are_open(void **state) {
+  (void)state;
+  for (int told = 0; told <= LIMBS; told++) {
+    scene s;
+    int32_t open;
+    scene_open(&s, alike);
+    orb_hint_places *hint = &s.small.hint;
+    hint->count = told;
+    for (int k = 0; k < 2; k++) {
+      hint->vertex[k] = orb_alloc(ctx, LIMBS, sizeof(int32_t));
+      assert_non_null(hint->vertex[k]);
+      for (int i = 0; i < told; i++) {
+        hint->vertex[k][i] = shape_farthest(&s.small.copy[k].mesh, limb[i]);
+      }
+    }
+    assert_int_equal(orb_open_limbs(&s.small, &open), ORB_OK);
+    assert_int_equal(open, LIMBS - told);
+    scene_close(&s);
+  }
 }
 
 /* The best match pairs the tips of each limb, whatever their lengths, and takes tips to tips, there and back. */
@@ -343,12 +366,10 @@ static void landmarks_are_tried(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_end_in_tips),
-                                     cmocka_unit_test(tips_meet_their_partners),
-                                     cmocka_unit_test(shifted_tips_meet_their_partners),
-                                     cmocka_unit_test(wrong_trials_are_dropped),
-                                     cmocka_unit_test(best_trial_keeps_limbs),
-                                     cmocka_unit_test(landmarks_make_a_trial),
-                                     cmocka_unit_test(landmarks_are_tried)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(limbs_end_in_tips),        cmocka_unit_test(limbs_without_landmarks_are_open),
+      cmocka_unit_test(tips_meet_their_partners), cmocka_unit_test(shifted_tips_meet_their_partners),
+      cmocka_unit_test(wrong_trials_are_dropped), cmocka_unit_test(best_trial_keeps_limbs),
+      cmocka_unit_test(landmarks_make_a_trial),   cmocka_unit_test(landmarks_are_tried)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }
