@@ -348,7 +348,7 @@ static orb_status try_pose_again(two_ways *c) {
   if (c->posed.is_unsure) {
     return try_pose(c, ORB_FIND_HINT_STRETCH_MOST);
   }
-  const int is_led = c->walked && c->loose <= ORB_FIND_POSED_POOR && c->landmark_count >= ORB_FIND_HINT_FEW;
+  const int is_led = c->walked && c->loose <= ORB_FIND_POSED_LED && c->landmark_count >= ORB_FIND_HINT_FEW;
   return have_two(c) && c->posed.is_unlike && !is_led ? try_pose(c, INFINITY) : ORB_OK;
 }
 
