@@ -380,7 +380,7 @@ static const double ORB_FIND_DRAWN_BEND = 2;
  * kinds with 8 landmarks whose matches led to 1.8 to 2.7, other starts took 1.3 CPU seconds each and led to less energy
  * in 4, by 3 to 5 %; where a match led to 3.4, they led to 1.6. If landmarks exclude that two shapes are one body, a
  * match is made where pins lead to no map or to one above LED; with fewer than ORB_FIND_HINT_FEW landmarks, to one
- * above energy.poor. With POOR instead of LED, 13 of 334 maps of animals of other kinds (seeds 31 and 41, 8 and 24
+ * above energy.poor. With POOR instead of LED, 13 of 334 pairs of animals of other kinds (seeds 31 and 41, 8 and 24
  * landmarks) had another map and a mean error of 4.2 instead of 3.7; matches of the 7 that pins led to 1.5 to 1.55
  * changed their error by little. */
 static const double ORB_FIND_POSED_POOR = 1.8, ORB_FIND_POSED_LOST = 3, ORB_FIND_POSED_LED = 1.55;
