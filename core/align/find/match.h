@@ -70,6 +70,7 @@ typedef struct orb_match {
   int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
   int is_unlike; /* 1: distances between landmarks exclude that the shapes are one body; a map is then only looked for
                     if the hint allows it */
+  int leaves_open;    /* 1: landmarks exclude one body, and several limbs have none */
   double walks_above; /* walks follow the best map if it bends the shapes more than this */
   double bend;        /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
   double cost;        /* of its trial (trials.h) */

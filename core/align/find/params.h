@@ -327,6 +327,7 @@ enum {
                                 where its limbs go. With 4 or 24 at
                                 first, a third of the pairs folded */
   ORB_FIND_HINT_SOURCES = 6, /* landmarks from which distances are measured; each takes 1 ms */
+  ORB_FIND_HINT_ALL = 16,    /* landmarks that tell of all limbs, twice FEW; below, looking for others takes 0.05 s */
   ORB_FIND_HINT_OPEN = 2     /* limbs without a landmark that leave open which is which; one has only one place to go */
 };
 /* A landmark tells of a limb whose tip lies this near along the surface: the length of a foot and a shank. In radii of

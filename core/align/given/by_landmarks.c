@@ -63,8 +63,9 @@ typedef struct posed {
   int keeps_angles;        /* its spheres do */
   double worst, loose;     /* the largest energy of its maps, and the mean, before they are fitted in space */
   int is_found;
-  int is_unsure; /* 1: not found, because the landmarks leave open whether the shapes are one body */
-  int is_unlike; /* 1: the landmarks exclude it, whether it is found or not */
+  int is_unsure;   /* 1: not found, because the landmarks leave open whether the shapes are one body */
+  int is_unlike;   /* 1: the landmarks exclude it, whether it is found or not */
+  int leaves_open; /* 1: the landmarks exclude it, and say nothing of several limbs */
 } posed;
 
 static void posed_free(orb_context *ctx, posed *p) {
@@ -135,7 +136,7 @@ static orb_status ask_pins(void *user, double energy, int *goes_on) {
 /* What the pose of one shape has led to. Without a match, or without a map, the energies are INFINITY. */
 typedef struct posed_map {
   double energy, loose; /* loose: before the map is fitted in space */
-  int is_unsure, is_unlike;
+  int is_unsure, is_unlike, leaves_open;
 } posed_map;
 
 /* Shapes that are composed side by side. If one has no map, those after it do not count, and are left out. */
@@ -224,6 +225,7 @@ static orb_status compose_posed(orb_context *ctx, const posing *all, int32_t i) 
   ORB_GO(status, find_posed(ctx, all, s, walks, &match), done);
   out->is_unsure = match.is_unsure;
   out->is_unlike = match.is_unlike;
+  out->leaves_open = match.leaves_open;
   if (c->seeks_part && match.inset.count > 0) {
     c->inset = match.inset;
   } else if (match.is_found) {
@@ -269,6 +271,7 @@ static orb_status compose_to_all(two_ways *c, double sure) {
     p->worst = fmax(p->worst, all.map[i].loose);
     p->is_unsure |= all.map[i].is_unsure;
     p->is_unlike |= all.map[i].is_unlike;
+    p->leaves_open |= all.map[i].leaves_open;
   }
   orb_free(c->ctx, all.map);
   return status;
@@ -338,17 +341,18 @@ static void keep_better(two_ways *c) {
 /* Looks for a match again, if there was none and the pins' map is poor. Landmarks that leave open whether the shapes
  * are one body may then be those of one after all. Landmarks that exclude it still exclude wrong matches; what they
  * leave guides walks where the landmarks alone lead to none, to more energy than right maps have, or are fewer than a
- * body has limbs and leave much of it open. With 5, 14 of 83 pairs of animals of other kinds then have more than 5 %
- * less error, and 4 more than 5 % more. */
+ * body has limbs and leave much of it open, or say nothing of several limbs. With 5, 14 of 83 pairs of animals of other
+ * kinds then have more than 5 % less error, and 4 more than 5 % more. */
 static orb_status try_pose_again(two_ways *c) {
   const double poor = orb_map_params_of(c->options->preset).energy.poor;
-  if (c->posed.is_found || c->loose <= poor) {
+  if (c->posed.is_found || (c->loose <= poor && !c->posed.leaves_open)) {
     return ORB_OK;
   }
   if (c->posed.is_unsure) {
     return try_pose(c, ORB_FIND_HINT_STRETCH_MOST);
   }
-  const int is_led = c->walked && c->loose <= ORB_FIND_POSED_LED && c->landmark_count >= ORB_FIND_HINT_FEW;
+  const int is_led =
+      c->walked && c->loose <= ORB_FIND_POSED_LED && c->landmark_count >= ORB_FIND_HINT_FEW && !c->posed.leaves_open;
   return have_two(c) && c->posed.is_unlike && !is_led ? try_pose(c, INFINITY) : ORB_OK;
 }
 
