@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "align/find/match.h"
+#include "align/find/params.h"
 #include "align/find/trials.h"
 #include "base/memory.h"
 #include "support_align.h"
@@ -327,6 +328,56 @@ static void cow_to_animal(void **state) {
   assert_match("spot.obj", "shrec381.off", 5, (const int32_t *[]){cow, animal}, 4, 1);
 }
 
+/* Whether so many true landmarks leave limbs open: one at the end of each of the first `told` limbs, the others where
+ * no limb is. */
+static int leave_open(int32_t count, int told) {
+  static const double longer[LIMBS] = {6, 5, 4, 3, 3.5}, shorter[LIMBS] = {1.6, 1.8, 1.4, 1.3, 1.5};
+  orb_context *ctx;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh mesh[2] = {creature_of(ctx, longer, 4, 0), creature_of(ctx, shorter, 4, 0)};
+  int32_t *vertex = orb_alloc(ctx, (size_t)count, sizeof *vertex);
+  assert_non_null(vertex);
+  for (int32_t i = 0, v = 0; i < count; i++) {
+    if (i < told) {
+      vertex[i] = tip_of(&mesh[0], i, 0);
+      continue;
+    }
+    const double *p = mesh[0].positions;
+    do {
+      v += 7;
+    } while (hypot(hypot(p[3 * v], p[3 * v + 1]), p[3 * v + 2]) > 1.01);
+    vertex[i] = v;
+  }
+  const orb_match_hint hint = {.count = count,
+                               .few = ORB_FIND_HINT_FEW,
+                               .trusted = count,
+                               .first = vertex,
+                               .second = vertex,
+                               .stretch = ORB_FIND_HINT_STRETCH_MOST,
+                               .sure = ORB_FIND_HINT_STRETCH,
+                               .asks_limbs = 1};
+  orb_match match;
+  assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], &hint, 1, &match), ORB_OK);
+  assert_true(match.is_unlike && !match.is_found);
+  const int open = match.leaves_open;
+  orb_match_free(ctx, &match);
+  orb_free(ctx, vertex);
+  orb_mesh_free(ctx, &mesh[0]);
+  orb_mesh_free(ctx, &mesh[1]);
+  orb_context_destroy(ctx);
+  return open;
+}
+
+/* Landmarks that exclude one body say whether they tell of all limbs but one. Many are taken to, and few are not asked.
+ */
+static void open_limbs_are_told(void **state) {
+  (void)state;
+  assert_true(leave_open(ORB_FIND_HINT_FEW, 2));
+  assert_true(leave_open(ORB_FIND_HINT_ALL - 1, 3));
+  assert_false(leave_open(ORB_FIND_HINT_FEW, LIMBS - 1));
+  assert_false(leave_open(ORB_FIND_HINT_ALL, 2));
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs),
                                      cmocka_unit_test(further_search_is_another_draw),
@@ -337,6 +388,7 @@ int main(void) {
                                      cmocka_unit_test(symmetric_shapes_are_not_sure),
                                      cmocka_unit_test(a_tie_is_shared),
                                      cmocka_unit_test(man_to_armadillo),
-                                     cmocka_unit_test(cow_to_animal)};
+                                     cmocka_unit_test(cow_to_animal),
+                                     cmocka_unit_test(open_limbs_are_told)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,6 +14,7 @@ typedef struct orb_match_hint {
   double stretch; /* orb_hint_stretch() above which no match is looked for */
   double sure;    /* orb_hint_stretch() up to which a match is taken; between the two, its bend decides */
   int seeks_part; /* whether one of two shapes is a part of the other one is looked for too */
+  int asks_limbs; /* whether landmarks that exclude one body leave limbs open is asked */
 } orb_match_hint;
 
 /* The hint on scaled coarse copies of the shapes. */

@@ -193,16 +193,16 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
 }
 
 /* Do landmarks leave open which limb is which, where trials bend the shapes much? A few do: five along the middle of a
- * spider say nothing of its legs. So do more of them that lie near no tip of several limbs, unless they exclude one
- * body, which no right trial bends much. More of other shapes do not: of 83 pairs of animals of other kinds (seed 31),
- * with 8 and with 24 landmarks improved trials led to as much error. */
-static orb_status leave_limbs_open(const orb_trials *small, int is_unlike, int *open) {
+ * spider say nothing of its legs. So do more, if several tips have none near them. Those that exclude one body do not
+ * count: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24 landmarks improved trials led to as much
+ * error. */
+static orb_status say_nothing_of_limbs(const orb_trials *small, int is_unlike, int *open) {
   int32_t limbs;
   *open = small->hint.count < ORB_FIND_HINT_FEW;
   if (*open || is_unlike) {
     return ORB_OK;
   }
-  ORB_TRY(orb_open_limbs(small, &limbs));
+  ORB_TRY(orb_open_limbs_count(small, &limbs));
   *open = limbs >= ORB_FIND_HINT_OPEN;
   return ORB_OK;
 }
@@ -213,7 +213,7 @@ static orb_status improve_trials(orb_trials *small, int is_unlike) {
   if (!orb_trials_bend_much(small)) {
     return ORB_OK;
   }
-  ORB_TRY(leave_limbs_open(small, is_unlike, &is_open));
+  ORB_TRY(say_nothing_of_limbs(small, is_unlike, &is_open));
   if (!is_open) {
     return ORB_OK;
   }
@@ -274,38 +274,38 @@ end:
   return status;
 }
 
-/* Do landmarks that exclude one body say nothing of several limbs? Pins then may take limbs to other limbs at
- * little energy: of 54 pairs of slim and stout hands with eight landmarks, four came to 1.22 to 1.27 with fingers on
- * other fingers, where right maps have 1.13. Many landmarks are taken to tell of all limbs. With fewer than FEW that is
- * not asked: of 83 pairs of animals of other kinds (seed 31) with five, one was better then and one worse. */
-static orb_status find_open_limbs(orb_trials *t, int *are_open) {
+/* Do landmarks that exclude one body leave limbs open? Pins then may take limbs to other limbs at little energy: four
+ * of 54 pairs of slim and stout hands (`orbmorph-posed`, three poses, seeds 1 to 3) with eight landmarks came to 1.22
+ * to 1.27 with fingers on other fingers, where right maps have 1.13. Fewer than FEW are not asked: of 83 pairs of
+ * animals of other kinds (seed 31) with five, one was better with a match and one worse. */
+static orb_status ask_limbs(orb_trials *t, int *are_open) {
   int32_t limbs = 0;
-  orb_status status = ORB_E_NO_MEMORY;
+  orb_status status;
+  *are_open = 0;
   if (t->hint.count < ORB_FIND_HINT_FEW || t->hint.count >= ORB_FIND_HINT_ALL) {
     return ORB_OK;
   }
   orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
   if (!small) {
-    return status;
+    return ORB_E_NO_MEMORY;
   }
   ORB_GO(status, orb_trials_open_small(t, small), end);
   ORB_GO(status, orb_trials_survey(small, 1), end);
-  status = orb_open_limbs(small, &limbs);
-end:
+  status = orb_open_limbs_count(small, &limbs);
   *are_open = limbs >= ORB_FIND_HINT_OPEN;
+end:
   orb_trials_close(small);
   orb_free(t->ctx, small);
   return status;
 }
 
 /* Landmarks exclude that the shapes are one body; one may be a part of the other one. */
-static orb_status give_up(orb_trials *t, int seeks, orb_match *out) {
-  ORB_TRY(find_open_limbs(t, &out->leaves_open));
-  if (!seeks || !orb_inset_is_possible(t)) {
-    return ORB_OK;
+static orb_status give_up(orb_trials *t, const orb_match_hint *hint, orb_match *out) {
+  if (hint->seeks_part && orb_inset_is_possible(t)) {
+    ORB_TRY(orb_trials_survey(t, 0));
+    ORB_TRY(orb_inset_find(t, &out->inset));
   }
-  ORB_TRY(orb_trials_survey(t, 0));
-  return orb_inset_find(t, &out->inset);
+  return hint->asks_limbs && out->inset.count == 0 ? ask_limbs(t, &out->leaves_open) : ORB_OK;
 }
 
 static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
@@ -319,7 +319,7 @@ static orb_status run(orb_context *ctx, const orb_mesh *first, const orb_mesh *s
   out->is_unlike = stretch > ORB_FIND_HINT_STRETCH_MOST;
   out->walks_above = out->is_unlike ? ORB_FIND_HINT_BEND : ORB_FIND_WALKS_FIRST;
   if (hint && stretch > hint->stretch) {
-    return give_up(t, hint->seeks_part, out);
+    return give_up(t, hint, out);
   }
   const int may_be = hint ? hint->seeks_part && !out->is_unlike : walks; /* for unlike ones, give_up() looks */
   const int seeks = may_be && orb_inset_is_possible(t);

@@ -17,6 +17,8 @@
  *   symmetry.h, mirrored.h
  *             the mirror symmetries of the copies, and trials that keep them
  *   raised.h  the best trials, on finer copies
+ *   open_limbs.h
+ *             how many limbs landmarks say nothing of
  *   hinted.h  the trial that eight landmarks or more make, without a search
  *   match.h   the best of them, its pairs and its targets
  *   inset/    whether one shape is a part of the other one (inset/inset.h)
@@ -65,12 +67,13 @@ typedef struct orb_match_other {
 typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_match {
-  int is_found;  /* 0: a shape has too few vertices, or no map was found; only is_unsure, is_unlike and inset are filled
-                    then */
-  int is_unsure; /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
-  int is_unlike; /* 1: distances between landmarks exclude that the shapes are one body; a map is then only looked for
-                    if the hint allows it */
-  int leaves_open;    /* 1: landmarks exclude one body, and several limbs have none */
+  int is_found;    /* 0: a shape has too few vertices, or no map was found; only is_unsure, is_unlike, leaves_open and
+                      inset    are filled then */
+  int is_unsure;   /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
+  int is_unlike;   /* 1: distances between landmarks exclude that the shapes are one body; a map is then only looked for
+                      if the hint allows it */
+  int leaves_open; /* 1: no match was looked for, because landmarks exclude one body, and several limbs have none near
+                      their tips. Only if the hint asks for it, and one shape is no part of the other one */
   double walks_above; /* walks follow the best map if it bends the shapes more than this */
   double bend;        /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
   double cost;        /* of its trial (trials.h) */

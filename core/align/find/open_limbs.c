@@ -14,7 +14,7 @@ static int is_told(const orb_trials *t, int s, int32_t v) {
   return 0;
 }
 
-orb_status orb_open_limbs(const orb_trials *t, int32_t *count) {
+orb_status orb_open_limbs_count(const orb_trials *t, int32_t *count) {
   *count = 0;
   for (int s = 0; s < 2; s++) {
     orb_tips tips;

@@ -327,11 +327,12 @@ enum {
                                 where its limbs go. With 4 or 24 at
                                 first, a third of the pairs folded */
   ORB_FIND_HINT_SOURCES = 6, /* landmarks from which distances are measured; each takes 1 ms */
-  ORB_FIND_HINT_ALL = 16,    /* landmarks that tell of all limbs, twice FEW; below, looking for others takes 0.05 s */
-  ORB_FIND_HINT_OPEN = 2     /* limbs without a landmark that leave open which is which; one has only one place to go */
+  ORB_FIND_HINT_ALL = 16,    /* from so many on, landmarks are taken to tell of all limbs; asking fewer takes 0.05 s */
+  ORB_FIND_HINT_OPEN = 2     /* limbs without a landmark from which on it is open which is which: a single one has only
+                                one place to go */
 };
 /* A landmark tells of a limb whose tip lies this near along the surface: the length of a foot and a shank. In radii of
- * a ball of the shape's area. */
+ * a ball of the shape's area. This, ALL and OPEN are first guesses, not varied. */
 static const double ORB_FIND_HINT_TELLS = 0.6;
 /* Shorter distances are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.
  */
@@ -381,7 +382,8 @@ static const double ORB_FIND_DRAWN_BEND = 2;
  * kinds with 8 landmarks whose matches led to 1.8 to 2.7, other starts took 1.3 CPU seconds each and led to less energy
  * in 4, by 3 to 5 %; where a match led to 3.4, they led to 1.6. If landmarks exclude that two shapes are one body, a
  * match is made where pins lead to no map or to one above LED; with fewer than ORB_FIND_HINT_FEW landmarks, to one
- * above energy.poor. With POOR instead of LED, 13 of 334 pairs of animals of other kinds (seeds 31 and 41, 8 and 24
+ * above energy.poor; with FEW or more that leave limbs open, to one above energy.good. With POOR instead of LED, 13 of
+ * 334 alignments of pairs of animals of other kinds (seeds 31 and 41, 8 and 24
  * landmarks) had another map and a mean error of 4.2 instead of 3.7; matches of the 7 that pins led to 1.5 to 1.55
  * changed their error by little. */
 static const double ORB_FIND_POSED_POOR = 1.8, ORB_FIND_POSED_LOST = 3, ORB_FIND_POSED_LED = 1.55;

@@ -20,7 +20,8 @@ export function children(pid) {
 /** The processes that check meshes and run jobs. */
 export const workers = (d) => children(d.child.pid).flatMap(children);
 
-/** Stops the process of the only job of a daemon once it embeds, so that it takes no core. The daemon does not notice. */
+/** Stops the process that runs the only job of a daemon, once that embeds. The stopped process takes no core, and the
+ * daemon does not notice. Returns a function that lets it go on. */
 export async function pause(d, job, options) {
   await until(async () => (await d.get(job.url, options)).json.stage === 'embed', 'the job runs', 120);
   const began = (pid) => {
@@ -30,8 +31,10 @@ export async function pause(d, job, options) {
       return 0; // it has ended
     }
   };
-  const last = workers(d).sort((a, b) => began(b) - began(a))[0]; // others have read its file
-  process.kill(last, 'SIGSTOP');
+  const [pid] = workers(d).sort((a, b) => began(b) - began(a)); // older ones have checked its mesh
+  if (!pid) throw new Error('no process runs the job');
+  process.kill(pid, 'SIGSTOP');
+  return () => process.kill(pid, 'SIGCONT');
 }
 
 function megabytesOf(pids, what) {
