@@ -140,8 +140,7 @@ class Bounded : public Method {
     if (cloud->num_attributes() > ATTRIBUTES_MOST) {
       return false;
     }
-    size_t decoded = 0,
-           taken = 0; /* of 256 attributes of 255 components and 2^32 points at most, so no sum overflows */
+    size_t decoded = 0, taken = 0; /* of 256 attributes of 255 components and 2^32 points at most: no sum overflows */
     for (int32_t i = 0; i < cloud->num_attributes(); i++) {
       const draco::PointAttribute *one = cloud->attribute(i);
       const int32_t width = one->num_components(), length = draco::DataTypeLength(one->data_type());

@@ -56,6 +56,21 @@ double sample_distance(const orb_primitive *primitive, const double p[3]) {
   return primitive->kind == SAMPLE_CONE ? cone(primitive, p) : ellipsoid(primitive, p);
 }
 
+/* The end of the part that begins at a primitive. */
+static size_t part_end(const orb_animal *animal, size_t from) {
+  size_t end = from + 1;
+  while (end < animal->primitive_count && !animal->primitives[end].begins_part)
+    end++;
+  return end;
+}
+
+static double part_field(const orb_animal *animal, size_t from, size_t end, const double p[3]) {
+  double part = sample_distance(&animal->primitives[from], p);
+  for (size_t i = from + 1; i < end; i++)
+    part = smooth_union(part, sample_distance(&animal->primitives[i], p), animal->primitives[i].blend);
+  return part;
+}
+
 /* Which parts the field near a place depends on. Distances change by no more than places do, and a union of parts
  * blends only what is nearly as near. So a part that is far from a place where another one is near adds nothing around
  * it. Its files have the same bytes as if no part were left out; `samples.same` compares those of the repository.
@@ -64,7 +79,6 @@ enum { PARTS_MOST = 64 };
 
 typedef struct vicinity {
   double middle[3];
-  int part_count;
   unsigned char skips[PARTS_MOST];
 } vicinity;
 
@@ -74,50 +88,43 @@ static const double VICINITY = 0.025; /* its radius, in units of the sample */
 static const double FARTHER = 0.4;
 
 static double field_in(const orb_animal *animal, const vicinity *near, const double p[3]) {
-  double whole = 1e9, part = 1e9, part_blend = 0;
-  int number = -1, skips = 0;
-  for (size_t i = 0; i < animal->primitive_count; i++) {
-    const orb_primitive *o = &animal->primitives[i];
-    if (o->begins_part) {
-      whole = smooth_union(whole, part, part_blend);
-      part = 1e9;
-      part_blend = o->blend;
-      number++;
-      skips = number < near->part_count && near->skips[number];
-    }
-    if (!skips)
-      part = smooth_union(part, sample_distance(o, p), o->begins_part ? 0 : o->blend);
+  double whole = 1e9;
+  int part = 0;
+  for (size_t from = 0, end; from < animal->primitive_count; from = end, part++) {
+    end = part_end(animal, from);
+    if (part >= PARTS_MOST || !near->skips[part])
+      whole = smooth_union(whole, part_field(animal, from, end, p), animal->primitives[from].blend);
   }
-  return smooth_union(whole, part, part_blend);
+  return whole;
 }
 
 double sample_field(const orb_animal *animal, const double p[3]) {
-  const vicinity all = {.part_count = 0};
+  const vicinity all = {.skips = {0}};
   return field_in(animal, &all, p);
+}
+
+static int has_ellipsoid(const orb_animal *animal, size_t from, size_t end) {
+  for (size_t i = from; i < end; i++)
+    if (animal->primitives[i].kind == SAMPLE_ELLIPSOID)
+      return 1;
+  return 0;
 }
 
 static void find_vicinity(const orb_animal *animal, const double p[3], vicinity *out) {
   double value[PARTS_MOST], least = 1e9;
-  int count = 0;
+  int part = 0;
   for (int k = 0; k < 3; k++)
     out->middle[k] = p[k];
-  for (size_t i = 0; i < animal->primitive_count; i++) {
-    const orb_primitive *o = &animal->primitives[i];
-    if (o->begins_part) {
-      if (count == PARTS_MOST)
-        break;
-      value[count++] = 1e9;
+  for (size_t from = 0, end; from < animal->primitive_count && part < PARTS_MOST; from = end, part++) {
+    end = part_end(animal, from);
+    value[part] = -1e9;
+    if (!has_ellipsoid(animal, from, end)) {
+      value[part] = part_field(animal, from, end, p);
+      least = value[part] < least ? value[part] : least;
     }
-    if (count == 0)
-      continue;
-    double *part = &value[count - 1];
-    *part = o->kind == SAMPLE_CONE ? smooth_union(*part, sample_distance(o, p), o->begins_part ? 0 : o->blend) : -1e9;
-    if (*part > -1e8 && *part < least)
-      least = *part;
   }
-  out->part_count = count;
-  for (int k = 0; k < count; k++)
-    out->skips[k] = value[k] > least + FARTHER;
+  for (int i = 0; i < part; i++)
+    out->skips[i] = value[i] > least + FARTHER;
 }
 
 static int is_outside(const vicinity *near, const double p[3]) {

@@ -368,7 +368,7 @@ static int leave_open(int32_t count, int told) {
   return open;
 }
 
-/* Landmarks that exclude one body say whether they tell of all limbs but one. Many are taken to, and few are not asked.
+/* Landmarks that exclude one body leave limbs open unless they lie at all ends but one. Many are taken to tell of all.
  */
 static void open_limbs_are_told(void **state) {
   (void)state;

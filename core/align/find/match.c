@@ -192,19 +192,38 @@ static int suits_hint(const orb_trial *one, const orb_match_hint *hint, double s
   return !hint || stretch <= hint->sure || bend_of(one, 1) <= ORB_FIND_HINT_BEND;
 }
 
+/* Opens the trials of small copies, and surveys these with distances. Close *small in any case. */
+static orb_status open_small(const orb_trials *t, orb_trials **small) {
+  *small = ORB_NEW0(t->ctx, orb_trials, 1);
+  if (!*small) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(orb_trials_open_small(t, *small));
+  return orb_trials_survey(*small, 1);
+}
+
+static void close_small(orb_context *ctx, orb_trials *small) {
+  if (small) {
+    orb_trials_close(small);
+    orb_free(ctx, small);
+  }
+}
+
+/* Do landmarks say nothing of so many limbs that it is open which is which? */
+static orb_status are_limbs_open(const orb_trials *small, int *open) {
+  int32_t limbs;
+  ORB_TRY(orb_open_limbs_count(small, &limbs));
+  *open = limbs >= ORB_FIND_HINT_OPEN;
+  return ORB_OK;
+}
+
 /* Do landmarks leave open which limb is which, where trials bend the shapes much? A few do: five along the middle of a
  * spider say nothing of its legs. So do more, if several tips have none near them. Those that exclude one body do not
  * count: of 83 pairs of animals of other kinds (seed 31), with 8 and with 24 landmarks improved trials led to as much
  * error. */
 static orb_status say_nothing_of_limbs(const orb_trials *small, int is_unlike, int *open) {
-  int32_t limbs;
   *open = small->hint.count < ORB_FIND_HINT_FEW;
-  if (*open || is_unlike) {
-    return ORB_OK;
-  }
-  ORB_TRY(orb_open_limbs_count(small, &limbs));
-  *open = limbs >= ORB_FIND_HINT_OPEN;
-  return ORB_OK;
+  return *open || is_unlike ? ORB_OK : are_limbs_open(small, open);
 }
 
 /* Improves trials that bend small copies much, unless landmarks say which limb is which. */
@@ -249,13 +268,9 @@ static orb_status rank_raised(orb_trials *t, int bends_little) {
 
 /* Makes trials of small copies, raises the best of them, and ranks these. is_unlike: that of the match. */
 static orb_status fill_trials(orb_trials *t, int is_unlike) {
-  orb_status status = ORB_E_NO_MEMORY;
-  orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
-  if (!small) {
-    return status;
-  }
-  ORB_GO(status, orb_trials_open_small(t, small), end);
-  ORB_GO(status, orb_trials_survey(small, 1), end);
+  orb_trials *small;
+  orb_status status;
+  ORB_GO(status, open_small(t, &small), end);
   ORB_GO(status, orb_trials_make(small), end);
   ORB_GO(status, orb_trials_rank(small), end);
   const int bends_little = orb_trials_bend(small) <= ORB_FIND_COARSE_TOO;
@@ -269,8 +284,7 @@ static orb_status fill_trials(orb_trials *t, int is_unlike) {
     status = orb_trials_weigh_asymmetry(small, t);
   }
 end:
-  orb_trials_close(small);
-  orb_free(t->ctx, small);
+  close_small(t->ctx, small);
   return status;
 }
 
@@ -278,24 +292,17 @@ end:
  * of 54 pairs of slim and stout hands (`orbmorph-posed`, three poses, seeds 1 to 3) with eight landmarks came to 1.22
  * to 1.27 with fingers on other fingers, where right maps have 1.13. Fewer than FEW are not asked: of 83 pairs of
  * animals of other kinds (seed 31) with five, one was better with a match and one worse. */
-static orb_status ask_limbs(orb_trials *t, int *are_open) {
-  int32_t limbs = 0;
+static orb_status ask_limbs(const orb_trials *t, int *are_open) {
+  orb_trials *small;
   orb_status status;
   *are_open = 0;
   if (t->hint.count < ORB_FIND_HINT_FEW || t->hint.count >= ORB_FIND_HINT_ALL) {
     return ORB_OK;
   }
-  orb_trials *small = ORB_NEW0(t->ctx, orb_trials, 1);
-  if (!small) {
-    return ORB_E_NO_MEMORY;
-  }
-  ORB_GO(status, orb_trials_open_small(t, small), end);
-  ORB_GO(status, orb_trials_survey(small, 1), end);
-  status = orb_open_limbs_count(small, &limbs);
-  *are_open = limbs >= ORB_FIND_HINT_OPEN;
+  ORB_GO(status, open_small(t, &small), end);
+  status = are_limbs_open(small, are_open);
 end:
-  orb_trials_close(small);
-  orb_free(t->ctx, small);
+  close_small(t->ctx, small);
   return status;
 }
 

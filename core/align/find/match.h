@@ -68,7 +68,7 @@ typedef struct orb_trials orb_trials; /* trials.h */
 
 typedef struct orb_match {
   int is_found;    /* 0: a shape has too few vertices, or no map was found; only is_unsure, is_unlike, leaves_open and
-                      inset    are filled then */
+                      inset are filled then */
   int is_unsure;   /* 1: a map was found, but landmarks and its bend leave open whether the shapes are one body */
   int is_unlike;   /* 1: distances between landmarks exclude that the shapes are one body; a map is then only looked for
                       if the hint allows it */

@@ -2,6 +2,9 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { until } from './daemon.mjs';
 
+/** What /proc/PID/stat says of a process, from its state on. Throws if it has ended. */
+const statOf = (pid) => readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ');
+
 /** The processes whose parent is `pid`. */
 export function children(pid) {
   return readdirSync('/proc')
@@ -9,7 +12,7 @@ export function children(pid) {
     .map(Number)
     .filter((each) => {
       try {
-        const fields = readFileSync(`/proc/${each}/stat`, 'latin1').split(') ').pop().split(' ');
+        const fields = statOf(each);
         return Number(fields[1]) === pid && fields[0] !== 'Z';
       } catch {
         return false; // it has ended
@@ -26,7 +29,7 @@ export async function pause(d, job, options) {
   await until(async () => (await d.get(job.url, options)).json.stage === 'embed', 'the job runs', 120);
   const began = (pid) => {
     try {
-      return Number(readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ')[19]);
+      return Number(statOf(pid)[19]);
     } catch {
       return 0; // it has ended
     }
@@ -64,7 +67,7 @@ export const ownMegabytes = (d, ...what) => megabytesOf([d.child.pid], what);
 
 /** Seconds of processor time of the daemon's own process. */
 export function ownSeconds(d) {
-  const fields = readFileSync(`/proc/${d.child.pid}/stat`, 'latin1').split(') ').pop().split(' ');
+  const fields = statOf(d.child.pid);
   return (Number(fields[11]) + Number(fields[12])) / 100;
 }
 
@@ -72,7 +75,7 @@ export function ownSeconds(d) {
 export function workSeconds(d) {
   let ticks = 0; // of 1/100 s
   const add = (pid, at) => {
-    const fields = readFileSync(`/proc/${pid}/stat`, 'latin1').split(') ').pop().split(' ');
+    const fields = statOf(pid);
     ticks += Number(fields[at]) + Number(fields[at + 1]);
   };
   for (const fork of children(d.child.pid)) {
