@@ -96,6 +96,18 @@ void orb_context_destroy(orb_context *ctx) {
   }
 }
 
+void orb_library_runs(orb_context *ctx, size_t counted) {
+  if (ctx->options.meter) {
+    ctx->options.meter(ctx, counted);
+  }
+}
+
+void orb_library_ends(orb_context *ctx) {
+  if (ctx->options.meter) {
+    ctx->options.meter(NULL, 0);
+  }
+}
+
 void orb_context_cancel(orb_context *ctx) {
   atomic_store(&ctx->root->cancelled, 1);
 }

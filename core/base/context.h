@@ -16,6 +16,11 @@ int64_t orb_context_max_triangles(const orb_context *ctx);
  * from the one may be freed from the other. Destroy it before ctx. orb_threads() of it is that of ctx. */
 ORB_MUST_CHECK orb_status orb_context_part(orb_context *ctx, orb_context **out);
 
+/* A library that allocates by C++'s operator new is about to run on this thread, or still runs, and the budget has
+ * `counted` bytes of what it takes; or it has ended. See orb_meter_fn. */
+void orb_library_runs(orb_context *ctx, size_t counted);
+void orb_library_ends(orb_context *ctx);
+
 /* Reports progress. Any thread; reports that collide with another are dropped. */
 void orb_progress(orb_context *ctx, const char *stage, double fraction);
 

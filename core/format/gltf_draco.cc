@@ -11,6 +11,10 @@
 #include <new>
 #include <stdexcept>
 
+extern "C" {
+#include "base/context.h"
+}
+
 namespace gltf {
 
 namespace {
@@ -36,16 +40,19 @@ const size_t FACE = 3 * sizeof(uint32_t); /* of what is decoded */
  * parts of its attributes, a small file that a fuzzer made took 35. */
 const size_t TAKEN_MOST = 3;
 
-/* Why a decoder has stopped. */
+/* What a decoder may take, and why it has stopped. */
 struct Bound {
   orb_context *ctx;
   const std::function<void(size_t)> &charge;
   std::vector<Counted<unsigned char>> &reserves;
   std::exception_ptr stopped; /* the exception, which does not pass through Draco */
+  size_t counted = 0;         /* bytes of the reserves */
 
   void reserve(size_t bytes) {
     reserves.emplace_back(Charged<unsigned char>(ctx));
     reserves.back().reserve(bytes);
+    counted += bytes;
+    orb_library_runs(ctx, counted);
   }
 
   template <typename Ask>
@@ -181,6 +188,11 @@ void decode_by(Bound *bound, draco::DecoderBuffer *buffer, draco::Mesh *out) {
     status = decoder.Decode(draco::DecoderOptions(), buffer, out);
   } catch (const std::length_error &) { /* of a container that cannot be so long: the memory does not exist, either */
     throw std::bad_alloc();
+  } catch (const std::bad_alloc &) {
+    if (orb_context_error(bound->ctx)->status == ORB_E_NO_MEMORY) { /* the meter has found no room in the budget */
+      throw Passed{ORB_E_NO_MEMORY};
+    }
+    throw;
   }
   if (bound->stopped) {
     std::rethrow_exception(bound->stopped);
@@ -190,12 +202,15 @@ void decode_by(Bound *bound, draco::DecoderBuffer *buffer, draco::Mesh *out) {
   }
 }
 
-}  // namespace
+/* Draco runs as long as this lives. */
+struct Running {
+  orb_context *ctx;
+  ~Running() { orb_library_ends(ctx); }
+};
 
-DracoMesh decode_draco(orb_context *ctx, Bytes bytes, const std::function<void(size_t)> &charge) {
-  DracoMesh out{{}, std::make_unique<draco::Mesh>()};
-  Bound bound{ctx, charge, out.reserves, nullptr};
-  bound.reserve(TABLE + A_BYTE * bytes.size);
+void decode(Bound *bound, Bytes bytes, draco::Mesh *out) {
+  const Running running{bound->ctx};
+  bound->reserve(TABLE + A_BYTE * bytes.size);
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char *>(bytes.at), bytes.size);
   draco::DecoderBuffer head = buffer;
@@ -208,14 +223,23 @@ DracoMesh decode_draco(orb_context *ctx, Bytes bytes, const std::function<void(s
     malformed("A glTF primitive (KHR_draco_mesh_compression) is not a mesh.");
   }
   if (header.encoder_method == draco::MESH_EDGEBREAKER_ENCODING) {
-    decode_by<draco::MeshEdgebreakerDecoder>(&bound, &buffer, out.mesh.get());
+    decode_by<draco::MeshEdgebreakerDecoder>(bound, &buffer, out);
   } else if (header.encoder_method == draco::MESH_SEQUENTIAL_ENCODING) {
-    decode_by<draco::MeshSequentialDecoder>(&bound, &buffer, out.mesh.get());
+    decode_by<draco::MeshSequentialDecoder>(bound, &buffer, out);
   } else {
     malformed("A glTF primitive (KHR_draco_mesh_compression) has an unknown method.");
   }
+}
+
+}  // namespace
+
+DracoMesh decode_draco(orb_context *ctx, Bytes bytes, const std::function<void(size_t)> &charge) {
+  DracoMesh out{{}, std::make_unique<draco::Mesh>()};
+  Bound bound{ctx, charge, out.reserves, nullptr};
+  decode(&bound, bytes, out.mesh.get());
   out.reserves.clear(); /* the decoder has gone; what is left is the mesh */
-  bound.reserve(size_of(*out.mesh));
+  out.reserves.emplace_back(Charged<unsigned char>(ctx));
+  out.reserves.back().reserve(size_of(*out.mesh));
   return out;
 }
 

@@ -1,7 +1,8 @@
 /* Draco's decoder within bounds: faces and values that the file's size does not justify, or that have no room in the
  * budget, are refused before it allocates them. Of Draco itself, a byte may ask for any amount of memory and time. Only
- * the tables of the entropy coder of values cannot be known before: up to 768 bytes for each byte of the file, which
- * nothing but the limit of a process bounds. */
+ * the tables of the entropy coder of values cannot be known before: up to 768 bytes for each byte of the file. The
+ * meter of the context counts them while Draco takes them; without one, nothing but the limit of a process bounds them.
+ */
 #ifndef ORB_FORMAT_GLTF_DRACO_HH
 #define ORB_FORMAT_GLTF_DRACO_HH
 

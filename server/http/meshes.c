@@ -5,6 +5,7 @@
 
 #include "http/http.h"
 #include "intake.h"
+#include "isolate/meter.h"
 
 /* What the caller's unfinished uploads may take of the disk. */
 static temporary_limits limits_of(const request *r) {
@@ -96,7 +97,8 @@ static orb_context *context_for_check(const intake_limits *limits) {
   orb_context_options options = {.memory_limit = (size_t)limits->memory,
                                  .threads = 1,
                                  .deadline_ms = limits->deadline_ms,
-                                 .max_triangles = limits->max_triangles};
+                                 .max_triangles = limits->max_triangles,
+                                 .meter = meter_set};
   orb_context *ctx = NULL;
   return orb_context_create(&options, &ctx) == ORB_OK ? ctx : NULL;
 }

@@ -8,6 +8,7 @@
 #include "convert.h"
 #include "faults.h"
 #include "intake.h"
+#include "isolate/meter.h"
 #include "isolate/task.h"
 #include "worker/run.h"
 
@@ -82,6 +83,7 @@ static orb_context *make_context(confined *c, job_progress *progress) {
                                  .threads = c->task.threads,
                                  .deadline_ms = c->task.deadline_ms,
                                  .max_triangles = c->task.max_triangles,
+                                 .meter = meter_set,
                                  .progress = progress_report,
                                  .progress_user = progress};
   orb_context *ctx = NULL;

@@ -12,6 +12,7 @@
 #include "api/json.h"
 #include "faults.h"
 #include "isolate/isolate.h"
+#include "isolate/meter.h"
 #include "log.h"
 #include "metrics.h"
 #include "store/keys.h"
@@ -164,6 +165,7 @@ static orb_context *begin(worker_pool *pool, job *j, int threads, job_progress *
                                  .threads = threads,
                                  .deadline_ms = orb_clock_ms() + pool->options.job_ms,
                                  .max_triangles = pool->options.max_triangles,
+                                 .meter = meter_set,
                                  .progress = progress_report,
                                  .progress_user = progress};
   orb_context *ctx = NULL;

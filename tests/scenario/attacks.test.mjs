@@ -124,6 +124,11 @@ const files = [
   ],
   ['a Draco mesh of 2^27 faces that break edges', 'too-large', () => attacks.sharedDraco(attacks.manyFaces(1), 1)],
   ['a Draco mesh of 2^27 faces that are listed', 'too-large', () => attacks.sharedDraco(attacks.manyFaces(0), 1)],
+  [
+    'a Draco mesh with a table of millions of symbols',
+    slow ? 'malformed-mesh' : 'no-memory', // sanitizers have an operator new of their own, which counts nothing
+    () => attacks.sharedDraco(attacks.symbolTable(1 << 18), 1),
+  ],
   ['a mesh of a long name that many nodes show', 'too-large', () => attacks.longName()],
 ];
 test('files that are made to cost much', async (t) => {

@@ -34,8 +34,9 @@ ORDER = [
     "client/web/src/take", "client/web/src/welcome", "client/web/src/state", "client/web/src/player",
     "client/web/src/actions", "client/web/src/url", "client/web/src/ui",
     "client/web/src/main"]
-# server/http/regions.c defines these in place of libc's for libmicrohttpd; other callers mean libc's.
-IN_PLACE_OF_LIBC = {"sendmsg"}
+# These are defined in place of a library's, and callers mean the library's: server/http/regions.c for libmicrohttpd, and
+# operator new and delete of server/isolate/meter.cc for Draco.
+IN_PLACE = {"sendmsg", "_Znwm", "_ZdlPv", "_ZdlPvm"}
 MOST_ENTRIES = {"core/align": 10}  # the most files and folders directly in a folder, so that a reader sees its parts at once
 SOURCE = re.compile(r"\.(inc\.h|c|h|cc|hh)$")
 SCRIPT = re.compile(r"\.(d\.ts|tsx|ts|mjs|js)$")
@@ -75,7 +76,7 @@ def add_calls(build, arrows):
     names = subprocess.run(["nm", "-A", "-g", *objects], capture_output=True, text=True, check=True).stdout if objects else ""
     defined, used = {}, collections.defaultdict(set)
     for item, kind, name in re.findall(r"^(.*):(?:[0-9a-f]+| +) (\w) (\S+)$", names, re.MULTILINE):
-        if name in IN_PLACE_OF_LIBC:
+        if name in IN_PLACE:
             continue
         if kind in "TDBRVWC":
             defined.setdefault(name, objects[item])

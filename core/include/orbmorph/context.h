@@ -75,6 +75,14 @@ typedef struct orb_allocator {
 /* The widest vector instructions that loops with several versions may use; at most those of the machine. */
 typedef enum orb_cpu { ORB_CPU_AUTO = 0, ORB_CPU_PLAIN, ORB_CPU_AVX2, ORB_CPU_AVX512 } orb_cpu;
 
+/* Counts what libraries take by C++'s operator new. Core counts what it can know beforehand: not the tables of Draco's
+ * entropy coder. A program that replaces operator new counts those too, such as the daemon (server/isolate/meter.cc).
+ * Core calls it around each call of such a library, on the thread of that call: what operator new takes from then on
+ * counts for ctx, and the budget has `counted` bytes of it already; again when the budget has more; and with NULL at
+ * the end. The program charges what is beyond them (orb_memory_charge()), lets operator new throw std::bad_alloc where
+ * the budget has no room, and discharges it at the end. */
+typedef void (*orb_meter_fn)(orb_context *ctx, size_t counted);
+
 typedef struct orb_context_options {
   size_t memory_limit;      /* bytes allocated at one time; 0: no limit */
   int threads;              /* including the caller's, at most 64; 0: one for each processor */
@@ -83,7 +91,8 @@ typedef struct orb_context_options {
   orb_progress_fn progress; /* NULL: none */
   void *progress_user;
   orb_allocator allocator;
-  orb_cpu cpu; /* for measurements and tests; the last bits of results may differ from value to value */
+  orb_meter_fn meter; /* NULL: nothing counts these */
+  orb_cpu cpu;        /* for measurements and tests; the last bits of results may differ from value to value */
 } orb_context_options;
 
 /* Makes a context; options NULL: all defaults. Threads start with the first parallel loop. ORB_E_NO_MEMORY. */

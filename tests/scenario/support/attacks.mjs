@@ -147,6 +147,17 @@ export function manyFaces(method) {
   return Buffer.concat([Buffer.from('DRACO'), Buffer.from([2, 2, 1, method, 0, 0, ...rest]), Buffer.alloc(64)]);
 }
 
+/** Draco's bytes of a tetrahedron whose values are said to be coded with 64 symbols for each of so many bytes: their table
+ * has 12 bytes a symbol. That it is not valid shows only once it is filled. */
+export function symbolTable(bytes) {
+  const corners = [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2];
+  const positions = [1, 1, 0, 5, 3, 0, 0, 1, 0xfe, 1, 1, 18]; // integers that are not predicted, in one table
+  const symbols = [];
+  for (let rest = 64 * bytes; rest > 0; rest >>>= 7) symbols.push((rest & 127) | (rest > 127 ? 128 : 0));
+  const head = [2, 2, 1, 0, 0, 0, 4, 4, 1, ...corners, ...positions, ...symbols];
+  return Buffer.concat([Buffer.from('DRACO'), Buffer.from(head), Buffer.alloc(bytes, 0xff)]);
+}
+
 /** glTF with one mesh of a long name, which many nodes show. */
 export function longName(length = 1_000_000, nodes = 90_000) {
   const mesh = { name: 'x'.repeat(length), primitives: [] };
