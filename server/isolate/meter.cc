@@ -16,8 +16,6 @@
 
 namespace {
 
-const size_t PART = 1u << 20; /* bytes: what is charged at one time, at least, since most of what is taken is small */
-
 struct Meter {
   orb_context *ctx;
   size_t counted; /* bytes that the budget has without this */
@@ -26,6 +24,22 @@ struct Meter {
 };
 
 thread_local Meter meter;
+
+}  // namespace
+
+extern "C" void meter_set(orb_context *ctx, size_t counted) {
+  if (meter.ctx && meter.ctx != ctx) {
+    orb_memory_discharge(meter.ctx, meter.charged);
+    meter = Meter{};
+  }
+  meter.ctx = ctx;
+  meter.counted = counted;
+}
+
+#if !SANDBOX_SANITIZED
+namespace {
+
+const size_t PART = 1u << 20; /* bytes: what is charged at one time, at least, since most of what is taken is small */
 
 bool take(size_t bytes) {
   const size_t room = meter.counted + meter.charged, taken = meter.taken + bytes;
@@ -46,16 +60,6 @@ void give(size_t bytes) {
 
 }  // namespace
 
-extern "C" void meter_set(orb_context *ctx, size_t counted) {
-  if (meter.ctx && meter.ctx != ctx) {
-    orb_memory_discharge(meter.ctx, meter.charged);
-    meter = Meter{};
-  }
-  meter.ctx = ctx;
-  meter.counted = counted;
-}
-
-#if !SANDBOX_SANITIZED
 void *operator new(std::size_t size) {
   void *block = std::malloc(size ? size : 1);
   if (block && meter.ctx && !take(malloc_usable_size(block))) {
