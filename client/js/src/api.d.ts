@@ -250,7 +250,7 @@ export type SupermeshRequest = {
     normals?: boolean;
     /** Default: "pingpong". */
     animation?: 'pingpong' | 'none';
-    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto uses a similarity if the frame clearly differs from the first shape's (a scale beyond 1.5, a rotation of more than 30°, or a distance of more than half a diagonal), and otherwise does not move the shape. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files, and if `match.verdict` is `unsure`, only where that is clearly because the files have other axes; `shapes[].fit` of the supermesh has the result. Default: "auto". */
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto uses a similarity if the frame clearly differs from the first shape's (a scale beyond 1.5, a rotation of more than 30°, or a distance of more than half a diagonal), and otherwise does not move the shape. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files, and if `match.verdict` is `unsure`, only where that is clearly because the files have other axes, or where the shape would otherwise collapse on the way; `shapes[].fit` of the supermesh has the result. Default: "auto". */
     fit?: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. Default: "linear". */
     path?: 'linear' | 'rigid';
@@ -323,7 +323,7 @@ export type CanonicalRequest = {
   asset: {
     normals: boolean;
     animation: 'pingpong' | 'none';
-    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto uses a similarity if the frame clearly differs from the first shape's (a scale beyond 1.5, a rotation of more than 30°, or a distance of more than half a diagonal), and otherwise does not move the shape. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files, and if `match.verdict` is `unsure`, only where that is clearly because the files have other axes; `shapes[].fit` of the supermesh has the result. */
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto uses a similarity if the frame clearly differs from the first shape's (a scale beyond 1.5, a rotation of more than 30°, or a distance of more than half a diagonal), and otherwise does not move the shape. It rotates shapes of other postures by right angles only, so that they stand as upright as in their files, and if `match.verdict` is `unsure`, only where that is clearly because the files have other axes, or where the shape would otherwise collapse on the way; `shapes[].fit` of the supermesh has the result. */
     fit: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. */
     path: 'linear' | 'rigid';
