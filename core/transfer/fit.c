@@ -25,10 +25,10 @@ static const double LIKE = 0.01;
  * to 41°; where a man stands along the back of a dog, 15° to 19° and 0.16 to 0.2 of the spread. */
 static const double AXES_DEGREES = 15, AXES_OFF = 0.13, AXES_LEFT = 0.25;
 /* AUTO_UNSURE: a shape whose places correspond to opposite ones of the first shape, so that it would shrink to less
- * than half of its spread on the way, is rotated if that leaves at most this share of the spread, as it does of shapes
- * without limbs (a tetrahedron and an icosahedron: 0.05), or if the shape then still stands upright, within these
- * degrees. */
-static const double OPPOSITE_OFF = 0.1, OPPOSITE_UP = 60;
+ * than two fifths of its spread on the way (1.2 here), is rotated if that leaves at most this share of the spread, as
+ * it does of shapes without limbs (a tetrahedron and an icosahedron: 0.05), or if the shape then still stands upright,
+ * within these degrees. */
+static const double OPPOSITE = 1.2, OPPOSITE_OFF = 0.1, OPPOSITE_UP = 60;
 
 /* Weighted points of both shapes. index NULL: all vertices; weight NULL: 1. */
 typedef struct fit_points {
@@ -146,8 +146,8 @@ static void drop_posture(double rotation[3][3], double h[3][3], double scale, do
   const double off = spread - scale * overlap(rotation, h), right_off = spread - scale * overlap(right, h);
   const double stay_off = spread - scale * (h[0][0] + h[1][1] + h[2][2]);
   const int is_axes = degrees <= AXES_DEGREES && right_off <= AXES_OFF * spread && right_off <= AXES_LEFT * stay_off;
-  const int is_opposite =
-      stay_off >= spread && (off <= OPPOSITE_OFF * spread || rotation[1][1] >= cos(OPPOSITE_UP * M_PI / 180));
+  const int is_opposite = stay_off >= OPPOSITE * spread &&
+                          (off <= OPPOSITE_OFF * spread || rotation[1][1] >= cos(OPPOSITE_UP * M_PI / 180));
   if (fit == ORB_FIT_AUTO_UNSURE && off > LIKE * spread && !is_axes && !is_opposite) {
     memcpy(rotation, stay, sizeof stay);
   } else if (degrees <= DEGREES_DIFFER && right_off <= POSTURE_WORSE * off) {
