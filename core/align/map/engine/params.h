@@ -110,13 +110,17 @@ typedef struct orb_map_params {
                         the distances between their landmarks, so less than energy.good can be reached */
     double walked;   /* energy of the first start, drawn, above which walks are tried. Maps of two people in other poses
                         have up to 1.5, and walks led to 0.1 to 0.5 more */
-    double folded; /* the first start begins on a coarser level if clearing flips raises the energy of its first one by
-                      more than this factor. With 1.25 to 1.32 three pairs of people came to 1.06 to 1.13 from it, two
-                      of them to 1.10 and 1.25 from a coarser one; with 1.38 to 1.54 two pairs came to 1.22 to 1.88, and
-                      to 1.14 to 1.23 from a coarser one */
-    double crumpled;    /* energy of the first start up to which it is drawn at once */
-    double drawn;       /* energy above which the map is not drawn: it stays caught */
-    int passes;         /* 1: passes follow (targets.c) */
+    double folded;  /* the first start begins on a coarser level if clearing flips raises the energy of its first one by
+                       more than this factor. With 1.25 to 1.32 three pairs of people came to 1.06 to 1.13 from it, two
+                       of them to 1.10 and 1.25 from a coarser one; with 1.38 to 1.54 two pairs came to 1.22 to 1.88, and
+                       to 1.14 to 1.23 from a coarser one */
+    double crumple; /* energy of a first map with landmarks beyond energy.bulk, above which few triangles have much
+                       of it, and a start from smooth targets follows: of 76 maps of people and animals, 18 */
+    double smooth_flips; /* flips of that start, as a multiple of those of the first one, up to which it is made. The
+                            starts that led to a better map had 0.04 to 1.23 */
+    double crumpled;     /* energy of the first start up to which it is drawn at once */
+    double drawn;        /* energy above which the map is not drawn: it stays caught */
+    int passes;          /* 1: passes follow (targets.c) */
     double gain;        /* a map is drawn again if the first draw has brought the energy below this share. In 38 runs of
                            people, animals of both halves and others, the second draw gained at most 0.1 % after a smaller
                            gain (23 runs), and up to 4 % after a larger one. With `quality` it always is */
