@@ -162,10 +162,13 @@ static orb_context *load_or_skip(const char *name, loaded *l) {
   return ctx;
 }
 
+/* The energy of a man and a woman that a walk of 24 landmarks alone leads to, and a little more. */
+static const double LANDMARK_WALK = 1.03;
+
 /* After registration the shape lies nearly on the other one, except for a few folds around the fingers. There landmarks
  * hold the surface, and with 14 and 20 landmarks also mirror landmarks, which are slightly off their true places. */
 static void more_landmarks_do_not_lead_astray(void **state) {
-  static const int32_t given[] = {10, 14, 16, 20};
+  static const int32_t given[] = {10, 14, 20, 24};
   (void)state;
   loaded l;
   orb_context *ctx = load_or_skip("human_man-human_woman", &l);
@@ -176,7 +179,10 @@ static void more_landmarks_do_not_lead_astray(void **state) {
     options.method = ORB_ALIGN_PIN;
     options.preset = ORB_PRESET_DEFAULT;
     align_and_check(ctx, l.shapes, 2, l.landmarks, given[i], &options, &out);
-    assert_true(mean_error(ctx, &l, &out) <= 0.0035);
+    const double off = mean_error(ctx, &l, &out);
+    print_message("%d landmarks: %.4f of the diagonal, energy %.3f\n", given[i], off, out.energy);
+    assert_true(off <= 0.0035);
+    assert_true(out.energy <= LANDMARK_WALK);
     orb_alignment_free(ctx, &out);
   }
   free_pair(ctx, &l);

@@ -174,8 +174,9 @@ static orb_status measure_first(orb_map_run *c, int walked) {
   double *bulk = &c->course.first_bulk;
   ORB_TRY(orb_map_energy_of(c, c->best, c->params.energy.bulk, bulk));
   const double energy = c->best_energy;
-  if (walked || c->walks_first || c->pairs.landmarks == 0 || energy > c->params.energy.poor ||
-      energy - *bulk <= c->params.targets.crumple) {
+  const int is_crumpled =
+      energy - 1 > c->params.targets.uneven * (*bulk - 1) && energy - *bulk > c->params.targets.crumple;
+  if (walked || c->walks_first || c->pairs.landmarks == 0 || energy > c->params.energy.poor || !is_crumpled) {
     return ORB_OK;
   }
   ORB_TRY(start_smooth(c));
