@@ -14,7 +14,8 @@ extern "C" {
  * such differences come from the axes of the file, and smaller ones from the posture of the shape.
  * AUTO_UNSURE: AUTO for a correspondence that may be wrong. Shapes are scaled and moved, but not rotated, unless they
  * fit so well that it does not matter which parts correspond, right angles make them fit far better, so that their
- * files have other axes, or their places correspond to opposite ones, so that they would collapse on the way. orb_merge() takes it for AUTO where the match is unsure.
+ * files have other axes, or their places correspond to opposite ones, so that they would collapse on the way.
+ * orb_merge() takes it for AUTO where the match is unsure.
  */
 typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY, ORB_FIT_AUTO, ORB_FIT_AUTO_UNSURE } orb_fit;
 typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } orb_animation;
