@@ -209,7 +209,14 @@ test('a small screen holds everything without scrolling sideways', async () => {
   });
   const fits = () => page.evaluate(() => document.documentElement.scrollWidth <= innerWidth);
   assert.ok(await fits());
-  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  const named = async (name, path) => ({ name, mimeType: 'text/plain', buffer: await readFile(sample(path)) });
+  const long = 'A_character_with_a_rather_long_name_low_poly_v2';
+  await addFiles(page, await named('Body low poly.obj', 'dog.obj'), await named(`${long}.off`, 'giraffe.off'));
+  const inside = async (name) => {
+    const { x, width } = await button(page, name).boundingBox();
+    return x >= 0 && x + width <= 360;
+  };
+  assert.ok(await inside(`Remove ${long}`));
   for (const tab of ['Shapes', 'Landmarks', 'Spheres']) {
     await button(page, tab, { exact: true }).click();
     assert.ok(await fits(), tab);
@@ -220,6 +227,11 @@ test('a small screen holds everything without scrolling sideways', async () => {
       tab,
     );
   }
+  await button(page, /^Morph 2 shapes$/).click();
+  await defaultShown(page);
+  assert.ok(await fits(), 'the morph');
+  assert.ok(await inside(`Show ${long}`));
+  assert.ok((await page.locator('.transport').boundingBox()).height < 80, 'names are on one line');
   await page.setViewportSize({ width: 740, height: 360 });
   await button(page, 'Shapes', { exact: true }).click();
   assert.ok(await fits(), 'in landscape');

@@ -97,6 +97,7 @@ function NoMorph() {
 
 function Transport({ result }: { result: Result }) {
   const slider = useRef<HTMLInputElement>(null);
+  const stops = useRef<HTMLDivElement>(null);
   const names = result.supermesh.shapes.map((shape) => shape.name);
   useEffect(
     () =>
@@ -105,6 +106,11 @@ function Transport({ result }: { result: Result }) {
         if (!input) return;
         input.value = String(time);
         input.style.setProperty('--at', `${time * 100}%`);
+        [...stops.current!.children].forEach((stop, i) => {
+          const isHere = !state.mix && Math.abs(time * (names.length - 1) - i) < 1e-6;
+          if (isHere) stop.setAttribute('aria-current', 'true');
+          else stop.removeAttribute('aria-current');
+        });
       }),
     [result],
   );
@@ -135,13 +141,14 @@ function Transport({ result }: { result: Result }) {
             event.currentTarget.setAttribute('aria-valuetext', say());
           }}
         />
-        <div class="stops">
+        <div class="stops" ref={stops}>
           {names.map((name, i) => (
             <button
               type="button"
               key={i}
               class="stop"
               aria-label={`Show ${name}`}
+              title={name}
               onClick={() => {
                 player.pause();
                 if (state.mix) set({ mix: null });
@@ -149,7 +156,7 @@ function Transport({ result }: { result: Result }) {
               }}
             >
               <span class="dot" style={{ background: tint(i) }} aria-hidden="true" />
-              {name}
+              <span class="clip">{name}</span>
             </button>
           ))}
         </div>
@@ -465,7 +472,9 @@ function Mix({ result }: { result: Result }) {
       {names.map((name, i) => (
         <label key={i} class="mix-row">
           <span class="dot" style={{ background: tint(i) }} aria-hidden="true" />
-          <span class="clip">{name}</span>
+          <span class="clip" title={name}>
+            {name}
+          </span>
           <input
             ref={(el) => void (inputs.current[i] = el)}
             type="range"
