@@ -85,6 +85,33 @@ test('upload, pick, name, undo, redo, export, import', async () => {
   const [soft] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
   const weights = JSON.parse(await readFile(await soft.path(), 'utf8')).landmarks.map(({ weight }) => weight);
   assert.deepEqual(weights, [undefined, 0.3, undefined]);
+
+  // a file that cannot be used says why, and changes nothing
+  const imports = async (name, content) => {
+    const before = (await shownToasts(page)).length;
+    const file = { name, mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(content)) };
+    await page.getByLabel('Landmark file').setInputFiles(file);
+    return until(async () => (await shownToasts(page))[before], 'an answer');
+  };
+  assert.equal(await imports('none.json', []), 'none.json has no landmarks.');
+  assert.match(
+    await imports('three.json', [[1, 2, 3]]),
+    /^three\.json has landmarks for 3 shapes, and only 2 are here/,
+  );
+  assert.match(await imports('far.json', [[1e6, 1e6]]), /^No landmark of far\.json fits these shapes/);
+  assert.equal(await landmarks(page).count(), 3);
+  // pairs of vertices, as the command line takes them
+  assert.equal(await imports('pair.json', [[1, 2]]), '1 landmark imported.');
+  await imports('pairs.json', [
+    [1, 2],
+    [300, 400],
+    [1, 700],
+  ]);
+  assert.equal(await landmarks(page).count(), 3);
+  await button(page, /^Morph 2 shapes$/).click();
+  const alert = page.getByRole('alert');
+  await alert.waitFor();
+  assert.match(await alert.innerText(), /Landmarks 1 and 3 are at one place on dog/);
   await done();
 });
 

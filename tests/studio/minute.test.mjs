@@ -54,11 +54,12 @@ test('the first page plays a morph without a click, and offers three more', asyn
   await done();
 });
 
-test('two files that are dropped on the first page morph without a click; a third does not', async () => {
+test('two files that are dropped on the first page morph without a click, with landmarks beside them; a third does not', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await page.locator('input[type=file]').first().waitFor({ state: 'attached' });
-  await dropFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await dropFiles(page, sample('dog.obj'), sample('giraffe.off'), sample('dog-giraffe.json'));
   await defaultShown(page);
+  await page.getByText('21 landmarks will meet exactly.').waitFor();
   const stage = page.locator('.morph .pane-view');
   const first = await shot(stage);
   await until(async () => (await difference(browser, first, await shot(stage))) > 0.01, 'it plays');

@@ -30,8 +30,8 @@ ORDER = [
     "server/log", "server/trim", "server/hash", "server/faults", "server/wake", "server/budget", "server/temporary", "server/tasks", "server/metrics", "server/pages", "server/studio",
     "server/trace", "server/net", "server/config_values", "server/config", "server/audit", "server/control", "server/systemd", "server/store", "server/isolate", "server/intake", "server/convert", "server/deliver", "server/cache", "server/queue", "server/worker",
     "server/evict", "server/scrub", "server/maintain", "server/folder_lock", "server/backup", "server/migrate", "server/admin", "server/http", "server/housekeeping", "server/parts", "server/main",
-    "client/cli", "client/js/src", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme", "client/web/src/focus",
-    "client/web/src/take", "client/web/src/welcome", "client/web/src/state", "client/web/src/player",
+    "client/cli", "client/js/src", "client/web/src/words", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme",
+    "client/web/src/focus", "client/web/src/take", "client/web/src/welcome", "client/web/src/state", "client/web/src/player",
     "client/web/src/actions", "client/web/src/url", "client/web/src/ui",
     "client/web/src/main"]
 # These are defined in place of a library's, and callers mean the library's: server/http/regions.c for libmicrohttpd, and

@@ -65,6 +65,8 @@ export interface Landmark {
   at: Record<string, Spot>;
   /** below 1: of a soft landmark, from a file; otherwise absent */
   weight?: number;
+  /** what else a file or a morph says of it, which the page only passes on */
+  also?: Partial<Pick<WireLandmark, 'pass' | 'radius' | 'confidence'>>;
   /** the landmark on the other side of the plane of symmetry */
   twin?: number;
 }
@@ -290,12 +292,17 @@ export const landmarksOnAll = (shapes = readyShapes()): Landmark[] =>
 
 /** The landmarks that are set on every shape, in the daemon's format. */
 export function wireLandmarks(shapes = readyShapes()): WireLandmark[] {
-  return landmarksOnAll(shapes).map(({ name, at, weight }) => ({
-    name,
+  return landmarksOnAll(shapes).map(({ name, at, weight, also }) => ({
+    ...(name && { name }),
     at: shapes.map(({ key }) => at[key].place),
     ...(weight && { weight }),
+    ...also,
   }));
 }
+
+/** What the page calls the landmark at an index of a request: the daemon names those without a name from 0. */
+export const landmarkName = (name: string | undefined, index: number) =>
+  name && name !== `landmark ${index}` ? name : `Landmark ${index + 1}`;
 
 /** The landmarks that a morph would use. */
 export const givenLandmarks = (shapes = readyShapes()): WireLandmark[] =>

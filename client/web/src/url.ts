@@ -20,6 +20,7 @@ import {
   takenFrom,
   TEXELS,
   watch,
+  type Landmark,
   type Matches,
   type Options,
   type Tab,
@@ -38,6 +39,17 @@ let restoring = false;
 let written = '';
 
 const round = (x: number) => String(Number(x.toPrecision(7)));
+
+/** The numbers of a landmark besides its places; nothing where all are as the daemon assumes them. */
+function encodeNumbers({ weight = 1, also: { pass = 0, radius = 0, confidence = 1 } = {} }: Landmark): string {
+  if (pass || radius || confidence < 1) return `*${[weight, pass, radius, confidence].join('_')}`;
+  return weight < 1 ? `*${weight}` : '';
+}
+
+function decodeNumbers(text: string) {
+  const [weight = 1, pass = 0, radius = 0, confidence = 1] = text.split('_').filter(Boolean).map(Number);
+  return { weight, pass, radius, confidence };
+}
 
 function encodePlace(place: Place | undefined): string {
   if (!place) return '';
@@ -154,7 +166,7 @@ function encode(): string {
     (state.landmarks === state.listed ? [] : state.landmarks)
       .map(
         (l) =>
-          `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.weight ? `*${l.weight}` : ''}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`,
+          `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${encodeNumbers(l)}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`,
       )
       .join(';'),
   );
@@ -281,8 +293,8 @@ export async function restore() {
       .filter(Boolean)
       .map((text) => {
         const [where, name = ''] = text.split('~');
-        const [places, weight = 1] = where.split('*');
-        return { name, at: places.split(':').map(decodePlace) as Place[], weight: Number(weight) };
+        const [places, numbers = ''] = where.split('*');
+        return { name, at: places.split(':').map(decodePlace) as Place[], ...decodeNumbers(numbers) };
       });
     if (landmarks.length) await takeLandmarks(landmarks, { undoable: false });
     const paint = PAINTS.find((name) => name === query.get('paint'));

@@ -1,6 +1,8 @@
 /** Edits landmarks with undo, and imports and exports them in the daemon's format. */
-import type { Landmark as WireLandmark, Place, Supermesh } from 'orbmorph';
+import type { Place, Supermesh } from 'orbmorph';
+import { listIn, marksOf, type Listed } from '../mesh/marks';
 import { work } from '../mesh/work';
+import { counted } from '../words';
 import type { Spot } from '../mesh/worker';
 import {
   landmarksOnAll,
@@ -75,8 +77,13 @@ export function placeOn(shape: Shape, spot: Spot, other: Spot | null = null) {
 
 /** Moves a landmark on a shape, as one step for undo. */
 export function moveTo(id: number, shape: Shape, spot: Spot) {
+  const moved = ({ also, ...mark }: Landmark): Landmark => ({
+    ...mark,
+    at: { ...mark.at, [shape.key]: spot },
+    also: also && { ...also, confidence: undefined }, // it is set now, no longer found
+  });
   change(
-    state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)),
+    state.landmarks.map((l) => (l.id === id ? moved(l) : l)),
     id,
   );
 }
@@ -124,16 +131,22 @@ export function forgetShape(key: string) {
   set({ landmarks, past: [], future: [] });
 }
 
-type Listed = Pick<WireLandmark, 'name' | 'at' | 'weight'>[];
+/** What else than its places the daemon takes of a landmark, where that differs from what it assumes. */
+const alsoOf = ({ pass, radius, confidence = 1 }: Listed[0]): Landmark['also'] => ({
+  ...(pass && { pass }),
+  ...(radius && { radius }),
+  ...(confidence < 1 && { confidence }),
+});
 
 /** The landmarks of a file or a response on the shapes; those that fit no shape are omitted. */
 async function located(list: Listed, snap: boolean): Promise<Landmark[]> {
   const shapes = readyShapes();
-  const made: Landmark[] = list.map(({ name = '', weight = 1 }) => ({
+  const made: Landmark[] = list.map((mark) => ({
     id: ++count,
-    name,
+    name: mark.name ?? '',
     at: {},
-    ...(weight < 1 && { weight }),
+    ...((mark.weight ?? 1) < 1 && { weight: mark.weight }),
+    also: alsoOf(mark),
   }));
   await Promise.all(
     shapes.map(async (shape, index) => {
@@ -160,25 +173,37 @@ export async function listFound(list: Listed, isShown: () => boolean) {
   if (free()) set({ landmarks, listed: landmarks, active: null });
 }
 
-/** Replaces the landmarks by those of a file or a response. Returns how many fit the shapes. */
+/**
+ * Replaces the landmarks by those of a file or a response; if none of these fits the shapes, nothing changes. Returns how
+ * many fit.
+ */
 export async function takeLandmarks(list: Listed, { undoable = true, snap = false } = {}): Promise<number> {
   const landmarks = await located(list, snap);
+  if (!landmarks.length) return 0;
   if (undoable) change(landmarks, null);
   else set({ landmarks, active: null });
   return landmarks.length;
 }
 
+/** Imports a landmark file; says what is wrong with one that it cannot use, and then changes nothing. */
 export async function importLandmarks(file: File) {
+  const { name } = file;
   try {
-    const content = JSON.parse(await file.text());
-    const list = Array.isArray(content) ? content : content.landmarks;
-    if (!Array.isArray(list)) throw new Error('It contains no array of landmarks.');
-    const taken = await takeLandmarks(list);
+    const list = listIn(await file.text());
+    if (!list) throw new Error(`${name} is not a landmark file: it has no list of landmarks.`);
+    const shapes = readyShapes().length;
+    if (!shapes) throw new Error(`${name} has landmarks. Add their shapes first, then import it under Landmarks.`);
+    const marks = marksOf(list, shapes, name);
+    const taken = await takeLandmarks(marks);
+    if (!taken)
+      throw new Error(`No landmark of ${name} fits these shapes: it may be of others, or of another order of them.`);
     toast(
-      taken === list.length ? `${taken} landmarks imported.` : `${taken} of ${list.length} landmarks fit these shapes.`,
+      taken === marks.length
+        ? `${counted(taken, 'landmark')} imported.`
+        : `${taken} of ${counted(marks.length, 'landmark')} fit these shapes.`,
     );
   } catch (error) {
-    toast(`${file.name} is not a landmark file. ${(error as Error).message}`, 'error');
+    toast((error as Error).message, 'error');
   }
 }
 

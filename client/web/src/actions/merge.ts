@@ -16,6 +16,7 @@ import {
   givenLandmarks,
   isFast,
   isTemplate,
+  landmarksOnAll,
   readyShapes,
   set,
   state,
@@ -27,7 +28,9 @@ import {
   type Result,
   type Running,
 } from '../state';
+import { landmarkTrouble, type Marks } from '../mesh/trouble';
 import { work } from '../mesh/work';
+import { counted } from '../words';
 import { morphModels } from '../view/models';
 import { player } from '../player';
 import { listFound, takeLandmarks } from './landmarks';
@@ -269,6 +272,7 @@ async function follow(
   request: SupermeshRequest | null,
   matches?: Matches,
 ) {
+  const marks = sentMarks();
   try {
     const supermesh = await get();
     running.fast?.abort.abort();
@@ -282,18 +286,31 @@ async function follow(
     }
   } catch (error) {
     if (running.abort.signal.aborted || error instanceof CancelledError) toast('Cancelled.');
-    else set({ problem: describe(error) });
+    else set({ problem: describe(error, marks) });
   } finally {
     await running.fast?.ended;
     if (state.running === running) set({ running: null });
   }
 }
 
-function describe(error: unknown) {
+/** The landmarks of a request that is sent now, as the page calls them. */
+function sentMarks(): Marks {
+  const shapes = readyShapes();
+  const marks = landmarksOnAll(shapes);
+  return {
+    names: marks.map((mark) => `${state.landmarks.indexOf(mark) + 1}${mark.name ? ` (${mark.name})` : ''}`),
+    shapes: shapes.map(({ name }) => name),
+    places: marks.map(({ at }) => shapes.map(({ key }) => at[key].position)),
+  };
+}
+
+function describe(error: unknown, marks: Marks) {
   if (error instanceof ProblemError && (error.status === 401 || error.status === 403))
     return { title: 'The token does not allow this', detail: explain(error), facts: null };
-  if (error instanceof ProblemError)
-    return { title: error.title || 'The daemon refused the request', detail: error.detail, facts: error.problem };
+  if (error instanceof ProblemError) {
+    const detail = (error.kind === 'bad-landmarks' && landmarkTrouble(error.problem, marks)) || error.detail;
+    return { title: error.title || 'The daemon refused the request', detail, facts: error.problem };
+  }
   const title = error instanceof GoneError ? 'The job of this link is gone' : 'The request failed';
   return { title, detail: (error as Error).message, facts: null };
 }
@@ -306,11 +323,13 @@ async function takeFound(supermesh: Supermesh) {
   const points = named.length
     ? []
     : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
-  const found = named.length ? named : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
+  const found = named.length
+    ? named.map(({ name, at }) => ({ name, at }))
+    : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
   noteAlignment(supermesh, null);
   const taken = await takeLandmarks(found, { snap: true });
   set({ tab: 'landmarks' });
-  toast(`${taken} landmarks found. Drag any that are off.`);
+  toast(taken ? `${counted(taken, 'landmark')} found. Drag any that are off.` : 'No landmarks found.');
 }
 
 export function cancelMerge() {

@@ -3,10 +3,11 @@ import { ProblemError, type Mesh, type Problem } from 'orbmorph';
 import samples from 'virtual:samples';
 import { client, patch, set, shapeOf, state, tint, toast, type Shape } from '../state';
 import { meshesOf } from '../mesh/companions';
+import { listIn } from '../mesh/marks';
 import { withRepairs } from '../mesh/repairs';
 import { work } from '../mesh/work';
 import { shapeModel } from '../view/models';
-import { forgetShape } from './landmarks';
+import { forgetShape, importLandmarks } from './landmarks';
 import { clearResult } from './merge';
 import { forgetSpheres } from './spheres';
 import { explain } from './token';
@@ -120,12 +121,21 @@ async function showDefects(shape: Shape, error: ProblemError) {
 
 const drawn = new Map<string, Promise<void>>();
 
-/** Adds the meshes among these files, and returns their number. */
-export async function addFiles(files: Iterable<File>): Promise<number> {
-  const { meshes, left } = await meshesOf([...files]);
-  if (!meshes.length) return 0;
-  if (left.length) toast(`Left out, because no shape is in them: ${left.join(', ')}`);
-  set({ tab: 'shapes' });
+/** The landmark files among these files: glTF documents are JSON, too, whatever their names end with. */
+async function landmarkFiles(files: File[]): Promise<File[]> {
+  const lists = await Promise.all(
+    files.map(async (file) => /\.json$/i.test(file.name) && listIn(await file.text()) !== null),
+  );
+  return files.filter((_, i) => lists[i]);
+}
+
+/** Adds the meshes among these files, then imports the landmark files. Returns how many of each there are. */
+export async function addFiles(files: Iterable<File>): Promise<{ meshes: number; marks: number }> {
+  const all = [...files];
+  const marks = await landmarkFiles(all);
+  const { meshes, left } = await meshesOf(all.filter((file) => !marks.includes(file)));
+  if (left.length && meshes.length) toast(`Left out, because no shape is in them: ${left.join(', ')}`);
+  if (meshes.length) set({ tab: 'shapes' });
   await Promise.all(
     meshes.map(async (file) => {
       const shape = create(file.name.replace(/\.[A-Za-z0-9]{1,5}$/, ''));
@@ -137,7 +147,11 @@ export async function addFiles(files: Iterable<File>): Promise<number> {
       await send(shape);
     }),
   );
-  return meshes.length;
+  for (const file of marks) {
+    await Promise.all(state.shapes.map(({ key }) => drawn.get(key))); // places are those of the drawn meshes
+    await importLandmarks(file);
+  }
+  return { meshes: meshes.length, marks: marks.length };
 }
 
 /** Adds samples in this order, however fast each is loaded. */

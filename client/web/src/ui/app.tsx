@@ -142,9 +142,10 @@ function Inspector() {
 /** Opens dropped files. Two or more on the first page are morphed at once, if all are accepted and nothing was done since. */
 async function takeDropped(files: File[]) {
   const isFirst = !state.shapes.length;
-  const added = await addFiles(files);
+  const { meshes: added, marks } = await addFiles(files);
   const { shapes, landmarks, tab, running, result } = state;
-  const untouched = shapes.length === added && !landmarks.length && tab === 'shapes' && !running && !result;
+  const isAsDropped = shapes.length === added && (marks > 0 || !landmarks.length);
+  const untouched = isAsDropped && tab === 'shapes' && !running && !result;
   if (isFirst && added > 1 && untouched && readyShapes().length === added) await startMerge();
 }
 

@@ -3,7 +3,7 @@ import { useRef } from 'preact/hooks';
 import { addFiles } from '../actions/shapes';
 import { Button } from './parts';
 
-const ACCEPT = '.obj,.off,.ply,.stl,.3mf,.gltf,.glb,.bin,.png,.jpg,.jpeg,.webp'; // the last ones: files of a .gltf
+const ACCEPT = '.obj,.off,.ply,.stl,.3mf,.gltf,.glb,.json,.bin,.png,.jpg,.jpeg,.webp'; // the last ones: landmarks, files of a .gltf
 
 export function FilePicker({ label, kind = 'plain' }: { label: string; kind?: 'plain' | 'primary' }) {
   const input = useRef<HTMLInputElement>(null);

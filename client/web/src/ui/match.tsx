@@ -1,5 +1,5 @@
 /** What the answer says about the map: how sure the match is, and where the map may be wrong. */
-import { set, state, type Result } from '../state';
+import { landmarkName, set, state, type Result } from '../state';
 import { followSuggestion } from '../actions/landmarks';
 import { flipMatch, flippedOf, nextMatch } from '../actions/merge';
 import { isWord, sideOf } from '../mesh/others';
@@ -93,7 +93,7 @@ export function Suspects({ result }: { result: Result }) {
     <ul class="hint" aria-label="Landmarks that may be misplaced">
       {suspects.map((suspect) => {
         const { landmark, name, shape, share, distance_relative: far } = suspect;
-        const called = name || `Landmark ${landmark + 1}`;
+        const called = landmarkName(name, landmark);
         return (
           <li key={`${shape} ${landmark}`}>
             {`${called} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
