@@ -25,12 +25,16 @@ before(async () => {
         'distortion',
         'symmetry',
         'repairs',
+        'refusal',
+        'marks',
+        'trouble',
         'dress',
         'others',
         'mended',
         'meshopt',
       ]
         .map((name) => `export * from './${name}.ts';`)
+        .concat(`export { count, relative } from '../words.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
       loader: 'ts',
@@ -801,4 +805,76 @@ test('meshopt: streams are decoded as meshoptimizer decodes them, and damaged on
       assert.throws(() => mesh.unpackView(view, bytes.subarray(0, at)), /damaged/, `${at} bytes`);
   }
   assert.throws(() => mesh.unpackView({ mode: 'INDICES', count: 1e9, byteStride: 4 }, streams[0][1]), /damaged/);
+});
+
+test('landmark files: as exported, and pairs of vertices as the command line takes them', () => {
+  const at = [{ vertex: 1 }, { point: [0, 0.5, 1] }];
+  for (const text of [JSON.stringify([{ at }]), JSON.stringify({ landmarks: [{ at }] })])
+    assert.deepEqual(mesh.marksOf(mesh.listIn(text), 2, 'l.json'), [{ at }]);
+  assert.deepEqual(mesh.marksOf(mesh.listIn('[[1,2],[3,4]]'), 2, 'l.json'), [
+    { at: [{ vertex: 1 }, { vertex: 2 }] },
+    { at: [{ vertex: 3 }, { vertex: 4 }] },
+  ]);
+  assert.equal(mesh.marksOf(mesh.listIn('[[1,2]]'), 3, 'l.json').length, 1, 'the third shape may follow');
+  for (const text of ['', 'null', '{"asset":{"version":"2.0"}}', '[1'])
+    assert.equal(mesh.listIn(text), null, `no landmarks in ${text}`);
+  for (const [list, why] of [
+    [[], /l\.json has no landmarks\.$/],
+    [[[1, 2, 3]], /l\.json has landmarks for 3 shapes, and only 2 are here\./],
+    [
+      [
+        [1, 2],
+        ['a', 'b'],
+      ],
+      /entry 2/,
+    ],
+    [[{ name: 'nose' }], /entry 1/],
+    [[null], /entry 1/],
+    [[{ at: [{ triangle: 1 }, { vertex: 2 }] }], /entry 1/],
+  ])
+    assert.throws(() => mesh.marksOf(list, 2, 'l.json'), why);
+});
+
+test('trouble with landmarks is told in the numbers and names of the page', () => {
+  const here = [0, 0, 0];
+  const there = [1, 0, 0];
+  const marks = {
+    names: ['1', '2 (nose)', '4'],
+    shapes: ['dog', 'giraffe'],
+    places: [
+      [here, there],
+      [there, here],
+      [here, here],
+    ],
+  };
+  const says = (landmarks, shape) => mesh.landmarkTrouble({ landmarks, shape }, marks);
+  assert.equal(
+    says([0, 1, 2], 0),
+    'Landmarks 1 and 4 are at one place on dog, but not on every shape. Move or delete one of them.',
+  );
+  assert.match(says([0, 1], 1), /^Landmarks 1 and 2 \(nose\) do not fit together on giraffe/);
+  assert.match(says([1], 1), /^Landmark 2 \(nose\) cannot be where it is on giraffe/);
+  assert.match(says([1]), /^Landmark 2 \(nose\) cannot be where it is while/);
+  assert.equal(says([7], 0), null);
+  assert.equal(says(undefined, 0), null);
+});
+
+test('refusals say what the buttons do, and count all pieces', () => {
+  const refusal = (kind, members) => ({ type: `/problems/${kind}`, detail: 'send it with repair=…', ...members });
+  const said = (problem, tried) => mesh.sentenceFor(problem, mesh.repairsFor(problem, tried));
+  const parts = [3, 2].map((triangles, part) => ({ part, triangles }));
+  const many = refusal('not-connected', { component_count: 250, components: [3, 2], parts });
+  assert.match(said(many), /^The mesh has 250 pieces/);
+  assert.deepEqual(mesh.piecesOf(many), { total: 250, listed: 2 });
+  assert.match(said(refusal('not-closed', { boundary_loops: 1 })), /1 hole\. “Fill the holes” covers it/);
+  assert.match(said(refusal('not-genus-zero', { genus: 2, loop_lengths_relative: [0.1, 0.2] })), /2 handles/);
+  const crowded = refusal('not-manifold', { edge_count: 1 });
+  assert.match(said(crowded), /^1 edge belongs to more than two faces\. “Split it there”/);
+  assert.equal(said(crowded, 'safe,split_nonmanifold'), crowded.detail, 'it was tried: there is no button');
+  assert.equal(said(refusal('malformed-mesh', {})), 'send it with repair=…');
+});
+
+test('numbers: groups of three, and rounding is no error', () => {
+  assert.equal(mesh.count(1234567), '1\u202f234\u202f567');
+  assert.deepEqual([0, 1e-13, 1e-3, 2.5e-6, null].map(mesh.relative), ['0 %', '0 %', '0.10 %', '2.5e-4 %', '–']);
 });

@@ -221,6 +221,11 @@ test('a file without a mesh is refused with an explanation', async () => {
     .setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
   await page.locator('.card.refused, .card.failed').waitFor();
   assert.ok((await page.getByRole('alert').first().innerText()).length > 20);
+  await button(page, 'Remove letter').click();
+  const buffer = Buffer.from(JSON.stringify({ asset: { version: '2.0' }, buffers: [{ uri: 'a.bin', byteLength: 9 }] }));
+  const file = { name: 'half.gltf', mimeType: 'model/gltf+json', buffer };
+  await page.locator('input[type=file]').first().setInputFiles([file]);
+  await page.getByRole('alert').getByText('half needs a.bin, which was not added with it.').waitFor();
   await done();
 });
 

@@ -16,7 +16,7 @@ export interface Shape {
   name: string;
   state: 'reading' | 'uploading' | 'ready' | 'refused' | 'failed';
   progress: number;
-  file?: Blob;
+  file?: File;
   mesh?: Mesh;
   model?: Model;
   /** whether it has one clear plane of symmetry; undefined until that is known */
@@ -32,6 +32,8 @@ export interface Shape {
   content?: Content;
   /** which of these the closed surface consists of, if the mesh is kept; none: those that were uploaded */
   surface?: { meshes: number[]; nodes: string[] };
+  /** of a refused glTF: the files with its data that were not added with it */
+  missing?: string[];
   /** The repairs that it was uploaded with. */
   repair?: string;
   problem?: Problem;

@@ -1,8 +1,9 @@
 /** Adds shapes from files, samples and the server; offers repairs for refused meshes. */
-import { ProblemError, type Mesh, type Problem } from 'orbmorph';
+import { ProblemError, type Mesh } from 'orbmorph';
 import samples from 'virtual:samples';
 import { client, patch, set, shapeOf, state, tint, toast, type Shape } from '../state';
-import { meshesOf } from '../mesh/companions';
+import { meshesOf, missingOf } from '../mesh/companions';
+import { CLOSE, LARGEST, numbers, sizeFor, SMALL } from '../mesh/refusal';
 import { listIn } from '../mesh/marks';
 import { withRepairs } from '../mesh/repairs';
 import { work } from '../mesh/work';
@@ -88,14 +89,13 @@ async function send(shape: Shape, repair = state.options.repair) {
   } catch (error) {
     if (!(error instanceof ProblemError) || error.status === 401 || error.status === 403)
       return patch(shape, { state: 'failed', message: explain(error) });
-    patch(shape, { state: 'refused', problem: error.problem });
+    const missing = error.kind === 'malformed-mesh' ? await missingOf(shape.file!) : [];
+    patch(shape, { state: 'refused', problem: error.problem, missing });
     await drawn.get(shape.key);
     await showDefects(shape, error);
   }
 }
 
-const numbers = (value: unknown): number[] =>
-  Array.isArray(value) ? value.flat(2).filter((x) => typeof x === 'number') : [];
 const pairs = (value: unknown): number[][] =>
   Array.isArray(value) ? value.filter((x) => Array.isArray(x) && x.length === 2) : [];
 
@@ -220,10 +220,6 @@ export async function uploadAgain(key: string, repair: string) {
   if (repair.includes(CLOSE)) await closeTheRest(shape, Number(repair.split(`${CLOSE}:`)[1] ?? SMALL));
 }
 
-const CLOSE = 'close_handles';
-/** The daemon's own limit of a handle that it closes, and the largest limit that it takes: relative to the diagonal. */
-const SMALL = 0.05;
-const LARGEST = 10;
 /**
  * The rounds that closeTheRest() makes. A refusal with tens of thousands of handles may leave loops out, and a cut can
  * lengthen others: each round allows the longest of those left.
@@ -238,44 +234,4 @@ async function closeTheRest(shape: Shape, size: number) {
     size = next;
     await send(shape, withRepairs(shape.repair ?? 'safe', `safe,${CLOSE}:${size}`));
   }
-}
-
-/** The size that allows loops of these lengths; 0 if there are none. */
-const sizeFor = (lengths: number[]) => {
-  const longest = Math.max(0, ...lengths);
-  return longest > SMALL ? Number((1.01 * longest).toPrecision(3)) : longest && SMALL;
-};
-
-/** The pieces after the largest; those of one name by that of their node, or by their numbers. */
-function otherParts(parts: unknown): { repair: string; label: string }[] {
-  if (!Array.isArray(parts)) return [];
-  const owned = (key: 'name' | 'node', value?: string) =>
-    value && parts.filter((part) => part[key] === value).length === 1 ? value : undefined;
-  return parts.slice(1).map(({ part, triangles, name, node }) => {
-    const own = owned('name', name) ?? owned('node', node);
-    const title = own ? `“${own}”` : [name && `“${name}”`, `piece ${part}`].filter(Boolean).join(', ');
-    return { repair: `safe,part:${part}`, label: `Keep ${title} (${triangles.toLocaleString('en')} triangles)` };
-  });
-}
-
-/** One button closes all handles, including those whose loops are not on show. */
-function handleRepairs(lengths: number[], genus: number): { repair: string; label: string }[] {
-  const size = sizeFor(lengths);
-  if (size === 0 || size > LARGEST) return [];
-  const label = genus === 1 ? 'Close the handle' : `Close all ${genus.toLocaleString('en')} handles`;
-  if (size === SMALL) return [{ repair: `safe,${CLOSE}`, label }];
-  return [{ repair: `safe,${CLOSE}:${size}`, label: `${label} along the red loop${genus === 1 ? '' : 's'}` }];
-}
-
-/** The repairs that the page offers for a refusal. */
-export function repairsFor(problem: Problem): { repair: string; label: string }[] {
-  const kind = problem.type.split('/').pop();
-  const others = otherParts(problem.parts);
-  const pieces = [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }, ...others];
-  if (kind === 'not-closed')
-    return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }, ...(others.length ? pieces : [])];
-  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components)) return pieces;
-  if (kind === 'not-manifold') return [{ repair: 'safe,split_nonmanifold', label: 'Split it there' }];
-  if (kind === 'not-genus-zero') return handleRepairs(numbers(problem.loop_lengths_relative), Number(problem.genus));
-  return [];
 }

@@ -44,6 +44,17 @@ async function embed(file: File, others: File[], used: Set<File>): Promise<File>
   return used.size ? new File([JSON.stringify(document)], file.name) : file;
 }
 
+/** The files that a glTF names for its data, without which it cannot be read: its buffers. */
+export async function missingOf(file: File): Promise<string[]> {
+  if (!/\.gltf$/i.test(file.name)) return [];
+  try {
+    const { buffers }: Linked = JSON.parse(await file.text());
+    return (buffers ?? []).flatMap(({ uri }) => (uri && !uri.startsWith('data:') ? [nameIn(uri)] : []));
+  } catch {
+    return []; // the daemon says what is wrong with it
+  }
+}
+
 /** The meshes among files that are added together, and the names of the other files that none of them contains. */
 export async function meshesOf(files: File[]): Promise<{ meshes: File[]; left: string[] }> {
   const meshes = files.filter(({ name }) => !COMPANION.test(name));

@@ -5,7 +5,8 @@ import { client, set, state } from '../state';
 import { addMesh, cancelJob, loadServer, openSupermesh, remove, watchJob } from '../actions/server';
 import { buildRequest } from '../actions/merge';
 import { escaped } from '../take/page';
-import { Bar, Button, count } from './parts';
+import { count } from '../words';
+import { Bar, Button } from './parts';
 import { fileName, TakeAway } from './take';
 
 const TITLES = { server: 'On the server', share: 'Use this morph', help: 'Help' };

@@ -4,7 +4,8 @@ import { followSuggestion } from '../actions/landmarks';
 import { flipMatch, flippedOf, nextMatch } from '../actions/merge';
 import { isWord, sideOf } from '../mesh/others';
 import { player } from '../player';
-import { Button, count, relative } from './parts';
+import { count, relative } from '../words';
+import { Button } from './parts';
 
 /** Another match lowers the confidence if it costs less than twice as much. Others are not worth a word. */
 const CREDIBLE = 2;

@@ -9,7 +9,8 @@ import { client } from '../state';
 import { Beside } from './beside';
 import { Legend, Name } from './labels';
 import { Coarse, Match, Suspects, Rotated, Warnings } from './match';
-import { Button, count, Icon, relative, Segments, Switch } from './parts';
+import { count, relative, ROUNDING } from '../words';
+import { Button, Icon, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';
 import { fileName } from './take';
@@ -187,9 +188,6 @@ function wereGiven({ supermesh }: Result) {
   const given = supermesh.request?.landmarks;
   return Array.isArray(given) && given.every((landmark) => landmark.confidence === 1);
 }
-
-/** Distances below this are rounding, relative to the diagonal. */
-const ROUNDING = 1e-12;
 
 /** "20 exact, 1 soft, up to 4.7 % from its place": exact are only those that were set and have a weight of 1. */
 function landmarksIn(result: Result): string {

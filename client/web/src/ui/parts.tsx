@@ -134,12 +134,3 @@ export function Bar({ value, label }: { value: number | null; label: string }) {
     </div>
   );
 }
-
-export const count = (n: number) => n.toLocaleString('en-US').replace(/,/g, '\u202f');
-
-export function relative(x: number | null | undefined): string {
-  if (x === undefined || x === null || !Number.isFinite(x)) return '–';
-  if (x === 0) return '0 %';
-  const percent = x * 100;
-  return `${percent < 0.001 ? percent.toExponential(1) : percent.toPrecision(2)} %`;
-}

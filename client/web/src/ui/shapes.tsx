@@ -14,9 +14,11 @@ import {
   type Shape,
 } from '../state';
 import type { Extra } from '../mesh/extras';
-import { addSamples, uploadAgain, moveShape, repairsFor, removeShape, sampleList } from '../actions/shapes';
+import { piecesOf, repairsFor, sentenceFor, type Offer } from '../mesh/refusal';
+import { addSamples, uploadAgain, moveShape, removeShape, sampleList } from '../actions/shapes';
 import { stage } from '../view/shared';
-import { Bar, Button, count, Field, Icon, Segments, Switch } from './parts';
+import { count, counted } from '../words';
+import { Bar, Button, Field, Icon, Segments, Switch } from './parts';
 import { FilePicker } from './files';
 import { Pane } from './pane';
 import { Welcome } from './welcome';
@@ -311,31 +313,31 @@ const HANDLES_SHOWN = 5;
 const HANDLES_MOST = 2000; // a longer list makes the page slow
 const PIECES_SHOWN = 5;
 
-function ShowAll({ what, all, change }: { what: string; all: boolean; change: (all: boolean) => void }) {
+function ShowAll({ label, all, change }: { label: string; all: boolean; change: (all: boolean) => void }) {
   return (
     <Button kind="quiet" aria-expanded={all} onClick={() => change(!all)}>
-      {all ? 'Show fewer' : `Show all ${what}`}
+      {all ? 'Show fewer' : label}
     </Button>
   );
 }
 
 /** A button for each repair; of very many pieces, the smaller ones on request, in a list that scrolls. */
-function Mends({ shape }: { shape: Shape }) {
+function Mends({ shape, offers }: { shape: Shape; offers: Offer[] }) {
   const [all, setAll] = useState(false);
-  const problem = shape.problem!;
-  const options = repairsFor(problem);
-  const unlisted = Number(problem.component_count ?? 0) - ((problem.components as unknown[] | undefined)?.length ?? 0);
+  const { total, listed } = piecesOf(shape.problem!);
+  const label =
+    total > listed ? `Show the largest ${count(listed)} of ${count(total)} pieces` : `Show all ${count(total)} pieces`;
   return (
     <>
       <div class={all ? 'row wrap scrolls' : 'row wrap'} role="group" aria-label={`Repairs of ${shape.name}`}>
-        {options.slice(0, all ? undefined : PIECES_SHOWN).map((option) => (
-          <Button key={option.repair} onClick={() => void uploadAgain(shape.key, option.repair)}>
-            {option.label}
+        {offers.slice(0, all ? undefined : PIECES_SHOWN).map((offer) => (
+          <Button key={offer.repair} onClick={() => void uploadAgain(shape.key, offer.repair)}>
+            {offer.label}
           </Button>
         ))}
-        {all && unlisted > 0 && <p class="facts">{count(unlisted)} smaller pieces are not listed.</p>}
+        {all && total > listed && <p class="facts">{count(total - listed)} smaller pieces are not listed.</p>}
       </div>
-      {options.length > PIECES_SHOWN && <ShowAll what={`${count(options.length)} pieces`} all={all} change={setAll} />}
+      {offers.length > PIECES_SHOWN && <ShowAll label={label} all={all} change={setAll} />}
     </>
   );
 }
@@ -355,7 +357,7 @@ function Handles({ lengths }: { lengths: number[] }) {
         {lengths.length > listed.length && <li>{count(lengths.length - listed.length)} more</li>}
       </ul>
       {lengths.length > HANDLES_SHOWN && (
-        <ShowAll what={`${count(lengths.length)} handles`} all={all} change={setAll} />
+        <ShowAll label={`Show all ${count(lengths.length)} handles`} all={all} change={setAll} />
       )}
     </>
   );
@@ -363,29 +365,42 @@ function Handles({ lengths }: { lengths: number[] }) {
 
 function Refusal({ shape }: { shape: Shape }) {
   const problem = shape.problem!;
+  const offers = repairsFor(problem, shape.repair);
   const loops = problem.boundary_loops as number | undefined;
-  const pieces = problem.components as unknown[] | undefined;
+  const pieces = piecesOf(problem).total;
   const handles = (problem.loop_lengths_relative as number[] | undefined) ?? [];
+  const lacks = !!shape.missing?.length;
+  const said = lacks ? missingFiles(shape) : sentenceFor(problem, offers);
   return (
     <div class="notice error" role="alert">
       <Icon name="alert" />
       <div>
-        <strong>{problem.title}</strong>
-        <p>{problem.detail}</p>
+        <strong>{lacks ? 'A file of this shape is missing' : problem.title}</strong>
+        <p>{said}</p>
         <p class="facts">
-          {loops !== undefined && `${loops} hole${loops === 1 ? '' : 's'}. `}
-          {Array.isArray(pieces) && `${pieces.length} pieces. `}
-          {problem.genus !== undefined && `Genus ${String(problem.genus)}. `}
-          {problem.line !== undefined && `Line ${String(problem.line)}. `}
-          {problem.offset !== undefined && `Byte ${String(problem.offset)}. `}
+          {loops !== undefined && `${counted(loops, 'hole')}. `}
+          {pieces > 0 && `${counted(pieces, 'piece')}. `}
+          {problem.genus !== undefined && `Genus ${count(Number(problem.genus))}. `}
+          {!lacks && problem.line !== undefined && `Line ${String(problem.line)}. `}
+          {!lacks && problem.offset !== undefined && `Byte ${String(problem.offset)}. `}
           {!!shape.defects && shape.model && <span class="red">Shown in red on the model.</span>}
         </p>
         {handles.length > 0 && <Handles lengths={handles} />}
-        <Mends shape={shape} />
+        <Mends shape={shape} offers={offers} />
+        {said !== problem.detail && (
+          <details class="dropped">
+            <summary>What the server says</summary>
+            <p class="facts">{problem.detail}</p>
+          </details>
+        )}
       </div>
     </div>
   );
 }
+
+/** A glTF without its buffers is refused, whatever else the daemon says of it. */
+const missingFiles = ({ name, missing = [] }: Shape) =>
+  `${name} needs ${missing.join(', ')}, which ${missing.length > 1 ? 'were' : 'was'} not added with it. Remove it, and add or drop all its files together.`;
 
 function change(options: Partial<Options>) {
   set({ options: { ...state.options, ...options } });
