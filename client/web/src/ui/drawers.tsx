@@ -1,6 +1,6 @@
 /** Drawers on the right: the server's content, ways to use a morph, help. */
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
-import type { Job } from 'orbmorph';
+import type { Job, Problem } from 'orbmorph';
 import { client, set, state } from '../state';
 import { addMesh, cancelJob, loadServer, openSupermesh, remove, watchJob } from '../actions/server';
 import { buildRequest } from '../actions/merge';
@@ -84,12 +84,7 @@ function Server() {
                   {when(item.created)}
                 </span>
               </button>
-              <Button
-                kind="quiet"
-                icon="trash"
-                label={`Delete the morph ${name}`}
-                onClick={() => void remove('supermesh', item)}
-              />
+              <Delete what={`the morph ${name}`} onDelete={() => remove('supermesh', item)} />
             </li>
           );
         })}
@@ -105,12 +100,7 @@ function Server() {
                 {count(mesh.triangles)} triangles · {when(mesh.created)}
               </span>
             </button>
-            <Button
-              kind="quiet"
-              icon="trash"
-              label={`Delete the shape ${mesh.name}`}
-              onClick={() => void remove('mesh', mesh)}
-            />
+            <Delete what={`the shape ${mesh.name}`} onDelete={() => remove('mesh', mesh)} />
           </li>
         ))}
       </ul>
@@ -124,6 +114,25 @@ function Server() {
   );
 }
 
+/** Deletes something of the server, once the user confirms it: nothing brings it back. */
+function Delete({ what, onDelete }: { what: string; onDelete: () => Promise<void> }) {
+  const [asks, setAsks] = useState(false);
+  if (!asks) return <Button kind="quiet" icon="trash" label={`Delete ${what}`} onClick={() => setAsks(true)} />;
+  return (
+    <div class="row sure" role="group" aria-label={`Delete ${what}?`}>
+      <Button kind="danger" aria-label={`Delete ${what} for good`} onClick={() => void onDelete()}>
+        Delete
+      </Button>
+      <Button kind="quiet" aria-label={`Keep ${what}`} data-takes-focus onClick={() => setAsks(false)}>
+        Keep
+      </Button>
+    </div>
+  );
+}
+
+/** Why a job failed. The detail counts landmarks and shapes from 0, and nothing here shows which these are. */
+const said = ({ title, detail, ...facts }: Problem) => ('landmarks' in facts ? title : detail);
+
 function JobRow({ job }: { job: Job }) {
   const live = job.state === 'running' || job.state === 'queued';
   return (
@@ -132,7 +141,7 @@ function JobRow({ job }: { job: Job }) {
         <strong>{job.kind === 'supermesh' ? 'Morph' : 'Map to the sphere'}</strong>
         <span class="muted">
           {job.state}
-          {job.problem ? `: ${job.problem.detail}` : ''} · {when(job.created)}
+          {job.problem ? `: ${said(job.problem)}` : ''} · {when(job.created)}
         </span>
         {live && <Bar label="Progress" value={job.progress ?? null} />}
       </div>
