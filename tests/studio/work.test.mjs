@@ -275,7 +275,7 @@ test('what is on the server is listed and opened', async () => {
   await done();
 });
 
-test('a morph whose shapes were deleted says so, and leaves the page as it is', async () => {
+test('a morph opens with its options; one whose shapes were deleted says so, and leaves the page as it is', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const pear = async (name, map) => {
     const { positions, triangles } = ball(2, map);
@@ -286,18 +286,53 @@ test('a morph whose shapes were deleted says so, and leaves the page as it is', 
     await pear('thin', (p) => [0.6 * p[0], p[1], p[2]]),
     await pear('wide', (p) => [2 * p[0], ...p.slice(1)]),
   ];
-  await json(daemon.url, '/v1/supermeshes', {
+  const { id } = await json(daemon.url, '/v1/supermeshes', {
     method: 'POST',
     headers: { 'Content-Type': 'application/json', Prefer: 'wait=60' },
-    body: JSON.stringify({ shapes: [{ mesh: thin }, { mesh: wide }], align: { method: 'rotate' } }),
+    body: JSON.stringify({
+      shapes: [{ mesh: thin }, { mesh: wide, name: 'broad' }],
+      align: { method: 'rotate' },
+      remesh: { method: 'subdivision', tolerance: 0.03, max_triangles: 2000 },
+      asset: { fit: 'none', path: 'rigid', path_steps: 2, animation: 'none' },
+    }),
   });
-  assert.equal((await fetch(`${daemon.url}/v1/meshes/${wide}`, { method: 'DELETE' })).status, 204);
+  // a morph is opened with its options: made again, it is the same one
+  const open = async () => {
+    await button(page, 'On the server', { exact: true }).click();
+    await page.locator('.list .item', { hasText: 'thin → broad' }).click();
+  };
+  await open();
+  await shownId(page);
+  await page.getByText('Options', { exact: true }).click();
+  await page.getByText('As the opened morph: animation none, path steps 2.').waitFor();
+  const ofThese = async () =>
+    (await json(daemon.url, '/v1/supermeshes?limit=100')).supermeshes.filter(
+      ({ shapes }) => shapes[1].name === 'broad',
+    );
+  await button(page, 'Morph again').click();
+  await until(
+    async () => (await button(page, 'Morph again').count()) && (await button(page, 'Pause').count()),
+    'again',
+  );
+  assert.equal(await shownId(page), id);
+  assert.equal((await ofThese()).length, 1, 'there is no other');
+  await button(page, 'Shapes', { exact: true }).click();
+  await button(page, 'Remove thin').click();
+  await button(page, 'Remove broad').click();
   await addFiles(page, sample('dog.obj'));
+  // who deletes something is asked first
   await button(page, 'On the server', { exact: true }).click();
-  await page.locator('.list .item', { hasText: 'thin → wide' }).click();
+  await button(page, 'Delete the shape wide').click();
+  await button(page, 'Keep the shape wide').click();
+  await button(page, 'Delete the shape wide').click();
+  assert.equal((await fetch(`${daemon.url}/v1/meshes/${wide}`)).status, 200);
+  await button(page, 'Delete the shape wide for good').click();
+  await until(async () => (await fetch(`${daemon.url}/v1/meshes/${wide}`)).status === 404, 'it is deleted');
+  await button(page, 'Close').click();
+  await open();
   const alert = page.getByRole('alert');
   await alert.waitFor();
-  assert.match(await alert.innerText(), /Shapes of this morph are missing\s+wide is no longer on the server/);
+  assert.match(await alert.innerText(), /Shapes of this morph are missing\s+broad is no longer on the server/);
   assert.deepEqual(await page.locator('.card strong').allInnerTexts(), ['dog']);
   await done();
 });

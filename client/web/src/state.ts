@@ -85,6 +85,8 @@ export interface Options {
   /** of baked textures: texels a side; null: as fine as those of the shape */
   texels: number | null;
   repair: string;
+  /** what else the request of an opened morph says: the page has no fields for it */
+  more: Pick<SupermeshRequest, 'embedding' | 'align' | 'asset'>;
 }
 
 /** The sizes of textures that the page offers. */
@@ -100,6 +102,7 @@ export const DEFAULTS: Options = {
   holes: 'reopen',
   texels: null,
   repair: 'safe',
+  more: {},
 };
 
 /** How a morph plays, here and in what is taken away. */

@@ -1,9 +1,9 @@
 /**
  * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
- *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
+ *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default&more=…
  * m: meshes on the server, r: a supermesh, j: a job, find=1: one that finds landmarks, go=1: one that makes the morph, where
  * it has no id yet, q: the best match, which of its matches r is, and which of them j computes, t: time along the morph, l:
- * landmarks (a vertex or x_y_z for each shape, and the weight of a soft one), cam: camera, o: options, x: what the morph takes from the shapes (1:skin), s: the parts of
+ * landmarks (a vertex or x_y_z for each shape; after * the weight of a soft one, and pass, radius and confidence), cam: camera, o: options, more: what else the request of an opened morph says, x: what the morph takes from the shapes (1:skin), s: the parts of
  * the first document that the surface consists of, look: of its materials, e: the weights of its
  * targets that are not shapes.
  */
@@ -18,7 +18,6 @@ import {
   TABS,
   surfaceOf,
   takenFrom,
-  TEXELS,
   watch,
   type Landmark,
   type Matches,
@@ -28,8 +27,9 @@ import {
 import { EXTRAS } from './mesh/extras';
 import { addFromServer } from './actions/shapes';
 import { takeLandmarks } from './actions/landmarks';
-import { matchesOf, openResult, resumeJob, startMerge } from './actions/merge';
+import { isOfPage, matchesOf, openResult, resumeJob, startMerge } from './actions/merge';
 import { setPaint } from './actions/spheres';
+import { takeNames } from './actions/request';
 import { openSupermesh } from './actions/server';
 import { player } from './player';
 import { stage } from './view/shared';
@@ -84,9 +84,18 @@ function decodeOptions(text: string): Options {
     path: from(path, ['linear', 'rigid'], DEFAULTS.path),
     fit: from(fit, ['auto', 'none', 'rigid', 'similarity'], DEFAULTS.fit),
     holes: from(holes, ['reopen', 'filled'], DEFAULTS.holes),
-    texels: TEXELS.find((size) => size === Number(texels)) ?? null,
+    texels: Number(texels) >= 16 ? Number(texels) : null,
     align: from(align, ['default', 'pin', 'rbf', 'rotate', 'auto'], DEFAULTS.align),
   };
+}
+
+function decodeMore(text: string | null): Options['more'] | null {
+  try {
+    const { embedding, align, asset } = JSON.parse(text ?? '');
+    return { ...(embedding && { embedding }), ...(align && { align }), ...(asset && { asset }) };
+  } catch {
+    return null; // there is none, or the link is damaged
+  }
 }
 
 const encodeTaken = () =>
@@ -171,6 +180,7 @@ function encode(): string {
       .join(';'),
   );
   if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
+  if (Object.keys(state.options.more).length) put('more', encodeURIComponent(JSON.stringify(state.options.more)));
   put('x', encodeTaken());
   put('s', encodeSurface());
   if (state.result?.look) put('look', String(state.result.look));
@@ -261,6 +271,8 @@ export async function restore() {
     if (camera) stage.orbit.restore(camera);
     const options = query.get('o');
     if (options) set({ options: decodeOptions(options) });
+    const more = decodeMore(query.get('more'));
+    if (more) set({ options: { ...state.options, more } });
     const named = (query.get('m') ?? '').split(',').filter(Boolean);
     const ids = named.filter(isId);
     const result = query.get('r');
@@ -308,6 +320,7 @@ export async function restore() {
       next = matches.next;
       const look = Number(query.get('look')) || 0;
       const extras = (query.get('e') ?? '').split(',').flatMap((text) => (text ? [Number(text) || 0] : []));
+      if (supermesh && isOfPage(supermesh)) takeNames(supermesh);
       if (supermesh && state.shapes.length)
         await openResult(supermesh, supermesh.request ?? null, { matches: matches.shown, look, extras });
       else if (!supermesh && !lost)

@@ -68,12 +68,15 @@ export function buildRequest(find = false): SupermeshRequest {
   const request: SupermeshRequest = { shapes: shapes.map(({ mesh, name }) => ({ mesh: mesh!.id, name })) };
   if (find) request.landmarks = 'auto';
   else if (landmarks.length) request.landmarks = landmarks;
-  if (!find && options.align !== 'default') request.align = { method: options.align };
+  const { more } = options;
+  if (more.embedding) request.embedding = more.embedding;
+  if (!find && more.align) request.align = more.align;
+  if (!find && options.align !== 'default') request.align = { ...request.align, method: options.align };
   const start = Array.isArray(request.landmarks) && !['rbf', 'rotate'].includes(options.align) && startOf(request);
   if (start) request.align = { ...request.align, start };
   request.remesh = { method: options.remesh, tolerance: options.tolerance };
   if (options.maxTriangles && options.remesh !== 'template') request.remesh.max_triangles = options.maxTriangles;
-  request.asset = { fit: find ? 'none' : options.fit };
+  request.asset = { ...more.asset, fit: find ? 'none' : options.fit };
   if (options.path !== 'linear') request.asset.path = options.path;
   if (options.holes !== 'reopen') request.asset.holes = options.holes;
   const surface = surfaceOf(shapes[0]);
@@ -104,7 +107,7 @@ function fastRequest(request: SupermeshRequest): SupermeshRequest | null {
   const hull = request.remesh?.method === 'adaptive' && !request.remesh.max_triangles && triangles <= HULL_MOST;
   return {
     ...bare,
-    align: { ...request.align, options: { preset: 'fast' } },
+    align: { ...request.align, options: { ...request.align?.options, preset: 'fast' } },
     ...(hull && { remesh: { method: 'convex-hull' } }),
   };
 }
@@ -161,7 +164,7 @@ async function sendMatch(matches: Matches, at: number) {
 }
 
 /** Whether the shapes of the page are those of a morph, in their order. */
-const isOfPage = ({ shapes }: Supermesh) =>
+export const isOfPage = ({ shapes }: Supermesh) =>
   readyShapes().length === shapes.length && readyShapes().every((shape, i) => shape.mesh!.id === shapes[i].mesh);
 
 /** The landmarks that a morph found; of another match that was sent, those that led to it. */

@@ -2,8 +2,8 @@
 import { ProblemError, type Mesh, type Supermesh } from 'orbmorph';
 import { client, set, state, toast } from '../state';
 import { addFromServer, removeShape } from './shapes';
-import { openResult, resumeJob } from './merge';
-import { takeLandmarks } from './landmarks';
+import { isOfPage, openResult, resumeJob } from './merge';
+import { takeRequest } from './request';
 import { player } from '../player';
 import { explain } from './token';
 
@@ -33,7 +33,9 @@ export async function openSupermesh(id: string, play = true) {
   set({ drawer: null });
   try {
     const supermesh = await client.getSupermesh(id);
-    if (!(await openShapes(supermesh))) return;
+    const areShown = isOfPage(supermesh);
+    if (!areShown && !(await openShapes(supermesh))) return;
+    await takeRequest(supermesh, { undoable: areShown });
     await openResult(supermesh, supermesh.request ?? null);
     set({ tab: 'morph', show: 'morph' });
     if (play) player.play();
@@ -44,12 +46,9 @@ export async function openSupermesh(id: string, play = true) {
 
 /** Opens the shapes of a morph in place of those of the page; says so and returns false if the server lacks one. */
 async function openShapes(supermesh: Supermesh): Promise<boolean> {
-  const wanted = supermesh.shapes.map((shape) => shape.mesh);
-  const present = state.shapes.map((shape) => shape.mesh?.id);
-  if (wanted.length === present.length && wanted.every((id, i) => id === present[i])) return true;
   const meshes = await Promise.all(
-    wanted.map((id) =>
-      client.getMesh(id).catch((error) => {
+    supermesh.shapes.map(({ mesh }) =>
+      client.getMesh(mesh).catch((error) => {
         if (error instanceof ProblemError && error.status === 404) return null;
         throw error;
       }),
@@ -63,9 +62,6 @@ async function openShapes(supermesh: Supermesh): Promise<boolean> {
   }
   for (const shape of [...state.shapes]) removeShape(shape.key);
   for (const mesh of meshes) await addFromServer(mesh!);
-  const given = supermesh.request?.landmarks;
-  const placed = Array.isArray(given) ? given : [];
-  if (placed.length) await takeLandmarks(placed, { undoable: false });
   return true;
 }
 

@@ -210,6 +210,10 @@ function take(shape: Shape, what: Extra, on: boolean) {
   if (on) patch(shape, { taken: [...(shape.taken ?? []), what] });
 }
 
+/** The sizes on offer, with one that the request of an opened morph has. */
+const texelChoices = (own: number | null) =>
+  own && !TEXELS.includes(own) ? [...TEXELS, own].sort((a, b) => a - b) : TEXELS;
+
 /** What the morph can take from the shapes besides their surfaces. */
 function Extras() {
   const [first] = readyShapes();
@@ -235,7 +239,7 @@ function Extras() {
             onChange={(event) => change({ texels: Number(event.currentTarget.value) || null })}
           >
             <option value="">As fine as those of the shape</option>
-            {TEXELS.map((size) => (
+            {texelChoices(state.options.texels).map((size) => (
               <option key={size} value={String(size)}>
                 {size} × {size} texels
               </option>
@@ -406,6 +410,35 @@ function change(options: Partial<Options>) {
   set({ options: { ...state.options, ...options } });
 }
 
+/** "embedding: method kernel-sampling, align: preset quality": names and values as in the request. */
+function moreOf({ embedding, align, asset }: Options['more']): string {
+  const list = (values: object = {}) =>
+    Object.entries(values).map(
+      ([key, value]) => `${key.replace(/_/g, ' ')} ${JSON.stringify(value).replace(/"/g, '')}`,
+    );
+  return [
+    ...(embedding ? [`embedding ${embedding.method}`, ...list(embedding.options)] : []),
+    ...list(align?.options),
+    ...list(asset),
+  ].join(', ');
+}
+
+/** What the next morph keeps of the request of an opened one, beyond the fields of the page. */
+function More() {
+  const { more } = state.options;
+  if (!Object.keys(more).length) return null;
+  return (
+    <div class="field">
+      <p class="hint">
+        As the opened morph: {moreOf(more)}.{' '}
+        <button type="button" class="link" onClick={() => change({ more: {} })}>
+          Leave this out
+        </button>
+      </p>
+    </div>
+  );
+}
+
 export function OptionsFold() {
   const { options } = state;
   return (
@@ -498,6 +531,7 @@ export function OptionsFold() {
           ]}
         />
       </div>
+      <More />
     </details>
   );
 }
