@@ -6,7 +6,7 @@ import { readFile } from 'node:fs/promises';
 import { browser, daemon } from './started.mjs';
 import { difference, shot } from './pictures.mjs';
 import { addFiles, counted, button, defaultShown, openPage, sample, settled, until } from './support.mjs';
-import { obj, torus } from '../scenario/support/shapes.mjs';
+import { ball, obj, torus } from '../scenario/support/shapes.mjs';
 
 let axe;
 before(async () => {
@@ -240,5 +240,12 @@ test('a small screen holds everything without scrolling sideways', async () => {
     settings.height > 120 && settings.y + settings.height <= 360,
     `settings can be read on its side: ${JSON.stringify(settings)}`,
   );
+  // more shapes than the daemon morphs at once
+  const buffer = Buffer.from(obj(ball(1)));
+  const more = Array.from({ length: 15 }, (_, i) => ({ name: `ball${i}.obj`, mimeType: 'text/plain', buffer }));
+  await page.locator('input[type=file]').first().setInputFiles(more);
+  await counted(page.locator('.card.ready'), 17, 'the shapes are uploaded');
+  assert.ok(await button(page, 'Morph 17 shapes').isDisabled());
+  await page.getByText('At most 16 shapes morph at once. Remove one of them.').waitFor({ state: 'attached' });
   await done();
 });

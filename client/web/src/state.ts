@@ -339,4 +339,7 @@ export function surfaceOf(shape: Shape | undefined): { meshes?: number[]; nodes?
   return { ...(meshes.length && { meshes }), ...(nodes.length && { nodes }) };
 }
 
+/** The daemon morphs at most so many shapes at once: API_SHAPES_MAX. */
+export const SHAPES_MOST = 16;
+
 export const readyShapes = () => state.shapes.filter((shape) => shape.state === 'ready' && shape.mesh);

@@ -19,6 +19,7 @@ import {
   landmarksOnAll,
   readyShapes,
   set,
+  SHAPES_MOST,
   state,
   surfaceOf,
   takenFrom,
@@ -112,8 +113,11 @@ function fastRequest(request: SupermeshRequest): SupermeshRequest | null {
   };
 }
 
+/** Whether there are as many shapes as the daemon morphs at once. */
+export const canMerge = () => readyShapes().length >= 2 && readyShapes().length <= SHAPES_MOST;
+
 export async function startMerge(purpose: Running['purpose'] = 'morph') {
-  if (state.running || readyShapes().length < 2) return;
+  if (state.running || !canMerge()) return;
   const running: Running = { purpose, job: null, abort: new AbortController(), fast: null };
   set({ running, problem: null });
   const request = buildRequest(purpose === 'find');

@@ -1,8 +1,8 @@
 /** The main action, always in the same place: the Morph button, or the progress of a morph. */
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Job } from 'orbmorph';
-import { givenLandmarks, isWaiting, readyShapes, state, type Running } from '../state';
-import { cancelMerge, startMerge } from '../actions/merge';
+import { givenLandmarks, isWaiting, readyShapes, SHAPES_MOST, state, type Running } from '../state';
+import { canMerge, cancelMerge, startMerge } from '../actions/merge';
 import { Notice } from './notice';
 import { Bar, Button } from './parts';
 
@@ -95,6 +95,10 @@ function Progress({ running }: { running: Running }) {
 
 /** What a morph still needs. */
 function missing(ready: number) {
+  if (ready > SHAPES_MOST) {
+    const many = ready - SHAPES_MOST;
+    return `At most ${SHAPES_MOST} shapes morph at once. Remove ${many === 1 ? 'one' : many} of them.`;
+  }
   const refused = state.shapes.filter((shape) => shape.state === 'refused').length;
   if (refused && ready + refused >= 2)
     return refused === 1 ? 'Repair or replace the refused shape first.' : 'Repair or replace the refused shapes first.';
@@ -126,14 +130,14 @@ export function Action() {
         <>
           <Button
             class={`button wide ${again ? '' : 'primary'}`}
-            disabled={ready < 2 || busy}
+            disabled={!canMerge() || busy}
             onClick={() => startMerge()}
           >
             {ready < 2 ? 'Morph' : again ? 'Morph again' : `Morph ${ready} shapes`}
           </Button>
           <p class="hint center">
-            {ready < 2
-              ? busy
+            {!canMerge()
+              ? busy && ready < 2
                 ? 'Uploading…'
                 : missing(ready)
               : landmarks

@@ -12,7 +12,7 @@ import {
   renameLandmark,
   undo,
 } from '../actions/landmarks';
-import { cancelMerge, startMerge } from '../actions/merge';
+import { canMerge, cancelMerge, startMerge } from '../actions/merge';
 import { Button, Icon, Switch } from './parts';
 import { Pane } from './pane';
 import { Caption } from './shapes';
@@ -65,7 +65,7 @@ export function LandmarksInspector() {
       <div class="row wrap">
         <Button
           icon={finding ? 'close' : 'wand'}
-          disabled={shapes.length < 2 || (!!state.running && !finding)}
+          disabled={!finding && (!canMerge() || !!state.running)}
           onClick={() => (finding ? cancelMerge() : void startMerge('find'))}
         >
           {finding ? 'Stop finding' : 'Find them for me'}
