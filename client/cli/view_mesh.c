@@ -105,8 +105,10 @@ static int read_primitive(glb_file *r, const cJSON *primitive, uint32_t skip, vi
   if (read_indices(r, primitive, out, *vertex, count, index) != 0) {
     return -1;
   }
+  int flat = !cJSON_GetObjectItemCaseSensitive(attributes, "NORMAL");
   for (uint32_t i = first / 3; i < *index / 3; i++) {
     out->painted[i] = material;
+    out->flat[i] = (unsigned char)flat;
   }
   *vertex += count;
   return 0;
@@ -122,8 +124,9 @@ static int allocate(view_mesh *out) {
   out->delta_normals = calloc(floats * out->target_count + 1, sizeof(float));
   out->indices = calloc(out->index_count + 1, sizeof(uint32_t));
   out->painted = calloc(out->index_count / 3 + 1, sizeof(int32_t));
+  out->flat = calloc(out->index_count / 3 + 1, 1);
   return out->positions && out->normals && out->colors && out->texcoords && out->delta_positions &&
-                 out->delta_normals && out->indices && out->painted
+                 out->delta_normals && out->indices && out->painted && out->flat
              ? 0
              : -1;
 }
@@ -163,6 +166,7 @@ int view_mesh_read(const char *path, view_mesh *out, char *error, size_t error_s
 void view_mesh_free(view_mesh *mesh) {
   view_materials_free(&mesh->materials);
   free(mesh->painted);
+  free(mesh->flat);
   free(mesh->positions);
   free(mesh->normals);
   free(mesh->colors);

@@ -14,7 +14,8 @@ typedef struct view_mesh {
   float *texcoords;                       /* 2 per vertex */
   float *delta_positions, *delta_normals; /* 3 per vertex, target by target */
   uint32_t *indices;
-  int32_t *painted; /* material of each triangle */
+  int32_t *painted;    /* material of each triangle */
+  unsigned char *flat; /* whether a triangle has no normals: glTF asks for those of its plane */
   view_materials materials;
 } view_mesh;
 

@@ -92,6 +92,34 @@ void view_frame_add(view_frame *frame, const view_vertex *vertices, uint32_t cou
   }
 }
 
+/* Gives the corners of a triangle the normal of its plane. On the canvas y points down. */
+static void flatten(view_vertex corners[3]) {
+  const view_vertex *a = &corners[0], *b = &corners[1], *c = &corners[2];
+  const float u[3] = {b->x - a->x, a->y - b->y, b->z - a->z}, v[3] = {c->x - a->x, a->y - c->y, c->z - a->z};
+  float normal[3], length = 0;
+  for (int k = 0; k < 3; k++) {
+    int i = (k + 1) % 3, j = (k + 2) % 3;
+    normal[k] = u[i] * v[j] - u[j] * v[i];
+    length = hypotf(length, normal[k]);
+  }
+  for (int k = 0; k < 9; k++) {
+    corners[k / 3].normal[k % 3] = length > 0 ? normal[k % 3] / length : 0;
+  }
+}
+
+static void draw_triangle(const view_mesh *mesh, uint32_t triangle, const view_options *options,
+                          const view_vertex *vertices, view_canvas *canvas) {
+  const uint32_t *at = mesh->indices + 3 * (size_t)triangle;
+  view_vertex corners[3] = {vertices[at[0]], vertices[at[1]], vertices[at[2]]};
+  view_paint paint = {
+      .material = mesh->materials.list[mesh->painted[triangle]], .wire = options->wire, .inside = options->inside};
+  paint.texture = paint.material.texture >= 0 ? &mesh->materials.textures[paint.material.texture] : NULL;
+  if (mesh->flat[triangle]) {
+    flatten(corners);
+  }
+  view_triangle(canvas, (const view_vertex *const[]){corners, corners + 1, corners + 2}, &paint);
+}
+
 void view_draw(const view_mesh *mesh, const view_options *options, const view_frame *frame, int left, int top,
                view_vertex *vertices, view_canvas *canvas) {
   float side = (float)(options->size * VIEW_SUPERSAMPLE);
@@ -102,12 +130,7 @@ void view_draw(const view_mesh *mesh, const view_options *options, const view_fr
     vertices[v].y = (float)top + side / 2 - scale * (vertices[v].y - (frame->low[1] + frame->high[1]) / 2);
     vertices[v].z *= scale;
   }
-  for (uint32_t i = 0; i < mesh->index_count; i += 3) {
-    const view_vertex *corners[3] = {&vertices[mesh->indices[i]], &vertices[mesh->indices[i + 1]],
-                                     &vertices[mesh->indices[i + 2]]};
-    view_paint paint = {
-        .material = mesh->materials.list[mesh->painted[i / 3]], .wire = options->wire, .inside = options->inside};
-    paint.texture = paint.material.texture >= 0 ? &mesh->materials.textures[paint.material.texture] : NULL;
-    view_triangle(canvas, corners, &paint);
+  for (uint32_t i = 0; i < mesh->index_count / 3; i++) {
+    draw_triangle(mesh, i, options, vertices, canvas);
   }
 }

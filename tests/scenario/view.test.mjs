@@ -126,6 +126,16 @@ test('vertex colours and material colours appear', async (t) => {
   assert.equal(mainly(at(blue, 0.25, 0.5)), 'b');
 });
 
+test('what has no normals is shaded by the planes of its triangles', async (t) => {
+  for (const yaw of ['0', '40', '-40']) {
+    const options = ['--poses', '2', '--size', '32', '--yaw', yaw];
+    const given = await draw(t, square({}), ...options);
+    const flat = await draw(t, square({ normals: undefined }), ...options);
+    const [one, other] = [given, flat].map((png) => at(png, 0.25, 0.5));
+    assert.ok(one.every((v, k) => Math.abs(v - other[k]) <= 2) && one[0] > 60, `${yaw}: ${other}, not ${one}`);
+  }
+});
+
 test('--inside paints triangles seen from inside red', async (t) => {
   const glb = square({ factor: [0, 1, 0, 1] });
   assert.equal(mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180'), 0.25, 0.5)), 'g');
