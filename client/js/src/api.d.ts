@@ -246,7 +246,7 @@ export type SupermeshRequest = {
     max_triangles?: number;
   };
   asset?: {
-    /** Default: true. */
+    /** Default: true. Without normals, viewers shade each triangle flat: hard edges of files without normals, such as STL, look hard then. */
     normals?: boolean;
     /** Default: "pingpong". */
     animation?: 'pingpong' | 'none';
