@@ -193,14 +193,17 @@ orb_status orb_refuse_open(orb_surface *s) {
 }
 
 orb_status orb_refuse_part(orb_surface *s, const orb_parts *parts, const orb_repair_options *options) {
+  char wanted[ORB_PART_NAME + 32];
   if (options->part_name[0]) {
-    (void)orb_fail(s->ctx, ORB_E_NOT_CONNECTED,
-                   "The mesh has no part of the name \"%s\". Use a name or number of the list, or correct the name.",
-                   options->part_name);
+    snprintf(wanted, sizeof wanted, "no part of the name \"%s\"", options->part_name);
   } else {
-    (void)orb_fail(s->ctx, ORB_E_NOT_CONNECTED, "The mesh has no part %d, but %d %s, numbered from 0 by size.",
-                   options->part, parts->count, plural(parts->count, "part", "parts"));
+    snprintf(wanted, sizeof wanted, "no part %d", options->part);
   }
+  if (parts->count == 1) { /* connected: the option is wrong, not the mesh */
+    return orb_fail(s->ctx, ORB_E_BAD_OPTION, "The mesh is one piece and has %s. Omit the part, or name 0.", wanted);
+  }
+  (void)orb_fail(s->ctx, ORB_E_NOT_CONNECTED, "The mesh has %s, but %d parts: use a name or number of the list.",
+                 wanted, parts->count);
   list_parts(s, parts);
   return ORB_E_NOT_CONNECTED;
 }

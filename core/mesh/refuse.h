@@ -14,6 +14,7 @@ orb_status orb_refuse_pieces(orb_surface *surface);
 /* With a loop for each handle; changes the surface. limit: the longest loop that close_handles was allowed to cut
  * along, relative to the diagonal; 0: the repair was not allowed. */
 orb_status orb_refuse_handles(orb_surface *surface, int64_t genus, double limit);
+/* ORB_E_NOT_CONNECTED with a list of the parts; ORB_E_BAD_OPTION if the mesh is one piece. */
 orb_status orb_refuse_part(orb_surface *surface, const orb_parts *parts, const orb_repair_options *options);
 orb_status orb_refuse_few(orb_surface *surface);
 

@@ -158,6 +158,9 @@ test('repairs that change the shape happen only on request', async (t) => {
     assert.ok(other.json.repairs.some((r) => r.kind === 'part' && r.count === 1));
   }
   assertProblem(await d.upload(named, { part: 'three' }), 422, 'not-connected');
+  const one = await d.upload(obj(ball(2)), { part: 4 });
+  assertProblem(one, 422, 'bad-option');
+  assert.match(one.json.detail, /one piece and has no part 4/);
   assertProblem(await d.upload(named, { part: 'two', repair: 'none' }), 400, 'bad-query');
   const unknown = await d.upload(open, { repair: 'magic' });
   assert.equal(unknown.status, 400, unknown.bytes.toString());

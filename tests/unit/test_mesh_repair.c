@@ -154,6 +154,13 @@ static void test_part_of_piece(void **state) {
     const char *name;
     int first;
   } cases[] = {{"body", 0}, {"head", 0}, {"eye", 4}, {"hat", -1}};
+  orb_mesh one;
+  const orb_repair_options fifth = {.repair = ORB_REPAIR_PART, .part = 5};
+  assert_int_equal(
+      orb_mesh_read(ctx, (const unsigned char *)TETRA_V TETRA_F, strlen(TETRA_V TETRA_F), ORB_FORMAT_OBJ, &one, NULL),
+      ORB_OK);
+  assert_int_equal(orb_mesh_repair_with(ctx, &one, &fifth), ORB_E_BAD_OPTION); /* connected */
+  orb_mesh_free(ctx, &one);
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     orb_mesh mesh;
     orb_repair_options options = {.repair = ORB_REPAIR_PART};
