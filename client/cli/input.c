@@ -2,6 +2,8 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
 
 #include "terminal.h"
 #include "text.h"
@@ -9,6 +11,8 @@
 /* How deep --set nests: in its dotted name, and again in its value. A request needs far less, and JSON parsers accept
  * far more (1,000). */
 enum { SET_DEPTH_MOST = 64 };
+/* Bytes of a file that is searched for landmarks: room for more landmarks than the daemon takes. */
+enum { LANDMARK_FILE_MOST = 8 << 20 };
 
 cJSON *cli_read_landmarks(const cli *c, const char *path) {
   size_t size;
@@ -44,6 +48,22 @@ cJSON *cli_read_landmarks(const cli *c, const char *path) {
     cJSON_ReplaceItemViaPointer(list, item, landmark);
   }
   return list;
+}
+
+int cli_holds_landmarks(const char *path) {
+  struct stat info;
+  size_t size;
+  const char *dot = strrchr(path, '.');
+  if (!dot || strcasecmp(dot, ".json") != 0 || stat(path, &info) != 0 || !S_ISREG(info.st_mode) ||
+      info.st_size > LANDMARK_FILE_MOST) {
+    return 0;
+  }
+  char *text = cli_read_file(path, &size);
+  cJSON *whole = text ? cJSON_ParseWithLength(text, size) : NULL;
+  int holds = cJSON_IsArray(whole) || cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(whole, "landmarks"));
+  cJSON_Delete(whole);
+  free(text);
+  return holds;
 }
 
 int cli_set_member(cJSON *object, const char *path, cJSON *value) {

@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "input.h"
 #include "prefix.h"
 #include "problem.h"
 #include "resource.h"
@@ -90,7 +91,11 @@ static int check_mesh(const cli *c, const char *operand) {
   }
   int there = stat(operand, &info) == 0, folder = there && S_ISDIR(info.st_mode);
   if (!folder && access(operand, R_OK) == 0) {
-    return CLI_DONE;
+    if (!cli_holds_landmarks(operand)) {
+      return CLI_DONE;
+    }
+    cli_error(c, "%s has landmarks, not a mesh: give it to 'orbmorph morph' with --landmarks %s", operand, operand);
+    return CLI_USAGE;
   }
   cli_error(c, "%s: %s", operand, folder ? "not a regular file" : strerror(errno));
   return CLI_USAGE;

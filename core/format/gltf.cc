@@ -170,9 +170,18 @@ struct Reader {
     orb_build_object_node(&build, reinterpret_cast<const unsigned char *>(node.data()), node.size());
   }
 
+  /* Says what a JSON document is that is not glTF 2.0. */
+  [[noreturn]] void refuse_other() const {
+    if (cJSON_IsArray(member(doc, "landmarks"))) {
+      throw Fault{ORB_E_UNKNOWN_FORMAT,
+                  "This is a landmark file; send landmarks as \"landmarks\" of a supermesh, or with --landmarks."};
+    }
+    malformed("The file is not glTF 2.0: its \"asset\" has no \"version\" that begins with 2.");
+  }
+
   void read(Bytes chunk, orb_mesh *out) {
     if (!cJSON_IsObject(doc) || text_of(member(doc, "asset"), "version").compare(0, 2, "2.") != 0) {
-      malformed("The file is not glTF 2.0.");
+      refuse_other();
     }
     meshes = array_of(doc, "meshes");
     buffers.load(doc, chunk, file_size);

@@ -86,6 +86,15 @@ static int is_dxf(const unsigned char *bytes, size_t size) {
          contains(bytes + 1, size < 16 ? size - 1 : 15, "SECTION");
 }
 
+/* A list of objects or lists, from its bracket on. */
+static int is_json_list(const unsigned char *bytes, size_t size) {
+  size_t at = 1;
+  while (at < size && bytes[at] <= ' ') {
+    at++;
+  }
+  return at < size && bytes[0] == '[' && (bytes[at] == '{' || bytes[at] == '[');
+}
+
 const char *orb_format_other(const unsigned char *bytes, size_t size) {
   if (is_3ds(bytes, size)) {
     return "a 3DS file" EXPORT;
@@ -104,6 +113,9 @@ const char *orb_format_other(const unsigned char *bytes, size_t size) {
   }
   if (is_dxf(bytes + at, size - at)) {
     return "a DXF file" EXPORT;
+  }
+  if (is_json_list(bytes + at, size - at)) {
+    return "a list in JSON, such as landmarks; send those as \"landmarks\" of a supermesh, or with --landmarks";
   }
   for (size_t i = 0; at < size && bytes[at] == '<' && i < sizeof DOCUMENTS / sizeof *DOCUMENTS; i++) {
     if (contains(bytes + at, size - at, DOCUMENTS[i].word)) {

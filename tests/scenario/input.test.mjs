@@ -209,6 +209,8 @@ test('files of other kinds are refused by name, with advice', async (t) => {
     // the second line could be of an OBJ
     ['# vtk DataFile Version 3.0\nv of a bone\nASCII\nDATASET POLYDATA\n', /VTK file.*PLY/],
     ['#VRML V2.0 utf8\n', /VRML file.*glTF/],
+    ['{"landmarks": [{"at": [{"vertex": 0}, {"vertex": 1}]}]}', /landmark file.*--landmarks/],
+    [' [\n[0, 1]]', /list in JSON.*--landmarks/],
   ];
   for (const [text, expected] of kinds) {
     const reply = await d.upload(Buffer.from(text, 'latin1'));
