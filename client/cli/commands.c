@@ -1,4 +1,4 @@
-/* upload, embed, job, usage, ls, get, rm. */
+/* upload, embed, job, usage, ls, rm. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -249,73 +249,6 @@ int cli_run_ls(cli *c) {
   }
   cli_error(c, "cannot list '%s'; choose meshes, embeddings, supermeshes or jobs", wanted);
   return CLI_USAGE;
-}
-
-static void print_any(const char *path, const cli_reply *reply) {
-  if (strstr(path, "/v1/meshes/")) {
-    cli_print_mesh(reply->json);
-  } else if (strstr(path, "/v1/embeddings/")) {
-    cli_print_embedding(reply->json);
-  } else if (strstr(path, "/v1/supermeshes/")) {
-    cli_print_supermesh(reply->json);
-  } else if (strstr(path, "/v1/jobs/")) {
-    cli_print_job(reply->json);
-  }
-}
-
-int cli_run_get(cli *c) {
-  const char *part = c->args.value[OPT_PART], *output = c->args.value[OPT_OUTPUT];
-  const char *tail = !part                     ? ""
-                     : !strcmp(part, "file")   ? "/file"
-                     : !strcmp(part, "asset")  ? "/asset.glb"
-                     : !strcmp(part, "sphere") ? "/sphere.ply"
-                                               : NULL;
-  const char *home = !part                    ? NULL
-                     : !strcmp(part, "file")  ? "meshes"
-                     : !strcmp(part, "asset") ? "supermeshes"
-                                              : "embeddings";
-  char *path = NULL;
-  cli_reply reply = {0};
-  int rc;
-  if (!cli_check_profile(c)) {
-    return CLI_USAGE;
-  }
-  if (c->args.value[OPT_PROFILE] && (!part || strcmp(part, "asset") != 0)) {
-    cli_error(c, "--profile needs --part asset");
-    return CLI_USAGE;
-  }
-  if (!tail) {
-    cli_error(c, "--part takes file (of a mesh), asset (of a supermesh) or sphere (of an embedding)");
-    return CLI_USAGE;
-  }
-  if (part || output) {
-    char *base = NULL;
-    rc = cli_can_write(c, output,
-                       !part                     ? "json"
-                       : !strcmp(part, "asset")  ? "glb"
-                       : !strcmp(part, "sphere") ? "ply"
-                                                 : NULL);
-    if (rc == CLI_DONE) {
-      rc = part ? cli_locate(c, home, c->args.operands[0], &base) : cli_find(c, c->args.operands[0], &base, &reply);
-    }
-    char *whole = cli_text("%s%s", base ? base : "", tail);
-    path = cli_asset_path(c, whole);
-    free(whole);
-    if (rc == CLI_DONE) {
-      rc = cli_download(c, path, output ? output : "-");
-    }
-    free(base);
-  } else {
-    rc = cli_find(c, c->args.operands[0], &path, &reply);
-    if (rc == CLI_DONE && (c->json || !reply.json)) {
-      puts(reply.body ? reply.body : "");
-    } else if (rc == CLI_DONE) {
-      print_any(path, &reply);
-    }
-  }
-  cli_reply_free(&reply);
-  free(path);
-  return rc;
 }
 
 int cli_run_rm(cli *c) {

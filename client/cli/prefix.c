@@ -72,6 +72,7 @@ static int gather(cli *c, const char *collection, const char *digits, int *count
 }
 
 int cli_resolve(cli *c, const char *digits, const char *const *collections, char **path) {
+  const char *only = collections[1] ? NULL : collections[0];
   char *lines = cli_text("%s", "");
   int count = 0, rc = CLI_DONE;
   *path = NULL;
@@ -79,7 +80,8 @@ int cli_resolve(cli *c, const char *digits, const char *const *collections, char
     rc = gather(c, *collections, digits, &count, path, &lines);
   }
   if (rc == CLI_DONE && count == 0) {
-    cli_error(c, "%s: not-found: no id begins with these digits; 'orbmorph ls' lists the ids", digits);
+    cli_error(c, "%s: not-found: no id%s%s begins with these digits; 'orbmorph ls%s%s' lists the ids", digits,
+              only ? " among the " : "", only ? only : "", only ? " " : "", only ? only : "");
     rc = CLI_REFUSED;
   } else if (rc == CLI_DONE && count > 1) {
     cli_error(c, "%s: several ids begin with these digits; give more:%s", digits, lines);

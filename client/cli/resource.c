@@ -70,8 +70,7 @@ static char *part_of(const char *file) {
   return cli_text("%s.part-%ld", file, (long)getpid());
 }
 
-/* Whether the name has no ending, or one of these. */
-static int fits(const char *file, const char *endings) {
+int cli_name_fits(const char *file, const char *endings) {
   const char *slash = strrchr(file, '/'), *name = slash ? slash + 1 : file, *dot = strrchr(name, '.');
   for (const char *word = endings; word && dot && dot > name && *word; word += strspn(word, " ")) {
     size_t length = strcspn(word, " ");
@@ -88,7 +87,7 @@ int cli_can_write(const cli *c, const char *file, const char *endings) {
   if (!file || is_stream(file)) {
     return CLI_DONE;
   }
-  if (!fits(file, endings)) {
+  if (!cli_name_fits(file, endings)) {
     char *base = cli_base_name(file);
     cli_error(c, "%s: this command cannot write that format; name the file %s.%.*s", file, base,
               (int)strcspn(endings, " "), endings);

@@ -26,6 +26,8 @@ int cli_await(cli *c, cli_reply *reply);
  * `endings`, such as "glb" or "md json" (NULL: any), or has no ending. NULL, "-", devices and pipes pass. Returns
  * CLI_DONE, or CLI_USAGE after printing the error. */
 int cli_can_write(const cli *c, const char *file, const char *endings);
+/* Whether a name has no ending, or one of these. */
+int cli_name_fits(const char *file, const char *endings);
 /* Whether --profile is a known one; prints the error. */
 int cli_check_profile(cli *c);
 /* The path of an asset in the profile that --profile names. The caller frees it. */
