@@ -243,7 +243,8 @@ void cli_print_supermesh(const cJSON *supermesh) {
   }
   const cJSON *match = member(supermesh, "match");
   if (match) {
-    printf("  match: %s (confidence %.2f)\n", cli_string(match, "verdict", "?"), cli_number(match, "confidence"));
+    printf("  match: %s (confidence %.2f)\n", cli_string(match, "verdict", "?"),
+           cli_hundredths(cli_number(match, "confidence")));
   }
   cli_warnings(stdout, "  warning: ", supermesh);
   printf("  time: %.3g s\n", cli_number(member(supermesh, "timings_ms"), "total") / 1000);
@@ -421,7 +422,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   const cJSON *match = member(supermesh, "match");
   if (match) {
     fprintf(out, "The correspondence was found without landmarks; verdict: %s (confidence %.2f).\n\n",
-            cli_string(match, "verdict", "?"), cli_number(match, "confidence"));
+            cli_string(match, "verdict", "?"), cli_hundredths(cli_number(match, "confidence")));
   }
   markdown_warnings(out, supermesh);
   markdown_shapes(out, supermesh);

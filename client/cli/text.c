@@ -121,6 +121,11 @@ void cli_count(double value, char out[32]) {
   out[fill] = 0;
 }
 
+double cli_hundredths(double value) {
+  const double rounding = 1e-9; /* 0.57 has 56.99999999999999 hundredths */
+  return floor(100 * value + rounding) / 100;
+}
+
 int cli_whole_number(const char *text, long least, long most, long *out) {
   char *end;
   errno = 0;

@@ -19,6 +19,9 @@ const char *cli_string(const cJSON *object, const char *name, const char *otherw
 double cli_number(const cJSON *object, const char *name); /* NaN if the member is missing */
 void cli_count(double value, char out[32]);               /* 12345 → 12,345 */
 
+/* Rounded down to hundredths: 0.4966 is printed as 0.49, not as the limit 0.50 that it misses. */
+double cli_hundredths(double value);
+
 /* Parse the whole text; 0 if it is not a number, or not in the range. */
 int cli_whole_number(const char *text, long least, long most, long *out);
 int cli_decimal(const char *text, double *out);

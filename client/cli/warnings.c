@@ -140,7 +140,7 @@ static int warn_of_match(FILE *out, const char *bullet, const cJSON *supermesh) 
   if (part) {
     fprintf(out, ", such as a left %s with a right one", part);
   }
-  fprintf(out, " (confidence %.2f). ", cli_number(match, "confidence"));
+  fprintf(out, " (confidence %.2f). ", cli_hundredths(cli_number(match, "confidence")));
   if (others > 1) {
     fprintf(out, "Set landmarks, or send one of the %d requests in `alternatives`.\n", others);
   } else {
