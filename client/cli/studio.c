@@ -52,7 +52,8 @@ static void on_end(int number) {
   ending = number;
 }
 
-/* Starts the daemon on a free port. *out: its standard output. −1 if it cannot be started. */
+/* Starts the daemon on a free port; the terminal shows its errors only, for people to read. *out: its standard output.
+ * −1 if it cannot be started. */
 static pid_t start(const char *data, FILE **out) {
   int ends[2];
   char *program = daemon_program();
@@ -65,7 +66,8 @@ static pid_t start(const char *data, FILE **out) {
     dup2(ends[1], STDOUT_FILENO);
     close(ends[0]);
     close(ends[1]);
-    execlp(program, program, "--listen", "127.0.0.1:0", "--data", data, (char *)NULL);
+    execlp(program, program, "--listen", "127.0.0.1:0", "--data", data, "--log-level", "error", "--log-format", "text",
+           (char *)NULL);
     fprintf(stderr, "orbmorph: cannot start %s: %s\n", program, strerror(errno));
     _exit(127);
   }

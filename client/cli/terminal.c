@@ -18,7 +18,7 @@ void cli_error(const cli *c, const char *format, ...) {
 }
 
 void cli_note(const cli *c, const char *format, ...) {
-  if (c->quiet) {
+  if (c->quiet || c->json) { /* standard error then has nothing but the JSON of a problem */
     return;
   }
   va_list list;
