@@ -112,6 +112,18 @@ static char **command_first(int argc, char **argv, int *at) {
   return line;
 }
 
+/* Says why a command line names no command that exists. */
+static void refuse_line(char **argv, const char *command) {
+  const char *unknown = NULL;
+  for (int i = 1; !command && !unknown && argv[i] && argv[i][0] == '-'; i++) {
+    unknown = cli_knows_option(argv[i]) ? NULL : argv[i];
+  }
+  if (command || unknown) {
+    fprintf(stderr, "orbmorph: unknown %s '%s'\n", command ? "command" : "option", command ? command : unknown);
+  }
+  cli_help(stderr, &commands);
+}
+
 int main(int argc, char **argv) {
   if (argc == 2 && (!strcmp(argv[1], "--version") || !strcmp(argv[1], "version"))) {
     puts("orbmorph " CLI_VERSION);
@@ -131,10 +143,7 @@ int main(int argc, char **argv) {
   const cli_command *command = given ? find_command(line[1]) : NULL;
   cli c = {.commands = commands};
   if (!command) {
-    if (given) {
-      fprintf(stderr, "orbmorph: unknown command '%s'\n", line[1]);
-    }
-    cli_help(stderr, &commands);
+    refuse_line(argv, given ? line[1] : NULL);
     rc = CLI_USAGE;
   } else if ((rc = cli_parse(command, argc, line, 2, &c.args)) == CLI_DONE) {
     if (c.args.value[OPT_HELP]) {

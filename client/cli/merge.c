@@ -1,4 +1,5 @@
 /* morph and merge: build the request, wait, download. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,49 +21,41 @@ static void set_text(const cli *c, cJSON *request, cli_option_id option, const c
   }
 }
 
-/* One entry of --transfer, such as 1:texture:2048. Returns NULL if it is not valid. */
-static cJSON *read_transfer(char *entry, long shapes) {
-  char *what = strchr(entry, ':'), *texels = what ? strchr(what + 1, ':') : NULL;
-  long from, resolution = 0;
-  if (!what) {
-    return NULL;
+/* One entry of --transfer, such as 1:texture:2048. Returns NULL after printing why it is not valid. */
+static cJSON *read_transfer(const cli *c, char *entry) {
+  char *whole = cli_text("%s", entry), *shape = strsep(&entry, ":"), *what = strsep(&entry, ":"), *texels = entry;
+  long from, resolution = 0, last = c->args.operand_count - 1;
+  cJSON *out = NULL;
+  if (!cli_whole_number(shape, 0, INT_MAX, &from) || !what || !*what) {
+    cli_error(
+        c, "--transfer takes a list such as 1:skin,1:texture:2048 (the shape, from 0; what; texels a side), not '%s'",
+        c->args.value[OPT_TRANSFER]);
+  } else if (from > last) {
+    cli_error(c, "--transfer %s: there is no shape %ld; the files are shapes 0 to %ld", whole, from, last);
+  } else if (texels && !cli_whole_number(texels, 16, 8192, &resolution)) {
+    cli_error(c, "--transfer %s: the texels a side are a whole number from 16 to 8192", whole);
+  } else {
+    out = cJSON_CreateObject();
+    cJSON_AddNumberToObject(out, "from", (double)from);
+    cJSON_AddStringToObject(out, "what", what);
   }
-  *what++ = 0;
-  if (texels) {
-    *texels++ = 0;
-  }
-  if (!cli_whole_number(entry, 0, shapes - 1, &from) || !*what ||
-      (texels && !cli_whole_number(texels, 16, 8192, &resolution))) {
-    return NULL;
-  }
-  cJSON *out = cJSON_CreateObject();
-  cJSON_AddNumberToObject(out, "from", (double)from);
-  cJSON_AddStringToObject(out, "what", what);
-  if (texels) {
+  if (out && texels) {
     cJSON_AddNumberToObject(out, "resolution", (double)resolution);
   }
+  free(whole);
   return out;
 }
 
 static int add_transfer(const cli *c, cJSON *request) {
   const char *list = c->args.value[OPT_TRANSFER];
   char *text = list ? cli_text("%s", list) : NULL, *rest = text, *entry;
-  cJSON *out = list ? cJSON_AddArrayToObject(request, "transfer") : NULL;
-  int rc = CLI_DONE;
-  while (rc == CLI_DONE && rest && (entry = strsep(&rest, ","))) {
-    cJSON *item = read_transfer(entry, c->args.operand_count);
-    if (item) {
-      cJSON_AddItemToArray(out, item);
-    } else {
-      cli_error(c,
-                "--transfer takes a list such as 1:skin,1:texture:2048 (the shape, from 0; what; texels a side), not "
-                "'%s'",
-                list);
-      rc = CLI_USAGE;
-    }
+  cJSON *out = list ? cJSON_AddArrayToObject(request, "transfer") : NULL, *item = out;
+  while (item && (entry = strsep(&rest, ","))) {
+    item = read_transfer(c, entry);
+    cJSON_AddItemToArray(out, item);
   }
   free(text);
-  return rc;
+  return list && !item ? CLI_USAGE : CLI_DONE;
 }
 
 static int add_options(const cli *c, cJSON *request) {

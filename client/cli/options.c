@@ -60,7 +60,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_INSIDE] = {"inside", 0, NULL, NULL, "paint triangles seen from inside red"},
     [OPT_FRAMES] = {"frames", 0, "N", NULL, "draw an animated PNG of N frames, 20 per second, instead of a sheet"},
     [OPT_KEY] = {"key", 'k', "KEY:SECRET", NULL, "signing key; default: $ORBMORPH_KEY"},
-    [OPT_EXPIRES] = {"expires", 0, "TIME", NULL, "time until the signature expires, such as 30d, 12h or 90m"},
+    [OPT_EXPIRES] = {"expires", 0, "TIME", NULL, "required: time until the signature expires, such as 30d, 12h or 90m"},
     [OPT_PROFILE] = {"profile", 0, "PROFILE", "float quantized meshopt", "profile of the downloaded asset"},
     [OPT_DATA] = {"data", 0, "DIR", NULL, "data folder; default: ~/.local/share/orbmorph"},
     [OPT_NO_OPEN] = {"no-open", 0, NULL, NULL, "print the address and open no browser"},
@@ -83,6 +83,12 @@ static int find_letter(const cli_command *command, char letter) {
     }
   }
   return -1;
+}
+
+int cli_knows_option(const char *text) {
+  static const cli_command any = {.options = UINT64_MAX};
+  size_t length = strcspn(text, "=");
+  return text[1] == '-' ? find_long(&any, text + 2, length - 2) >= 0 : find_letter(&any, text[1]) >= 0;
 }
 
 static int usage_error(const cli_command *command, const char *what, const char *text) {

@@ -97,6 +97,9 @@ typedef struct cli_args {
 int cli_parse(const cli_command *command, int argc, char **argv, int first, cli_args *args);
 void cli_args_free(cli_args *args);
 
+/* Whether an argument that begins with - is an option of any command. */
+int cli_knows_option(const char *text);
+
 void cli_help(FILE *out, const cli_commands *commands);
 void cli_help_command(FILE *out, const cli_command *command);
 

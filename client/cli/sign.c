@@ -21,6 +21,18 @@ static long long moment(const char *text) {
   return unit ? (long long)time(NULL) + number * unit : 0;
 }
 
+/* Whether a query, from its question mark on, has a parameter of this name. */
+static int has_parameter(const char *query, const char *name) {
+  size_t length = strlen(name);
+  for (; *query; query += strcspn(query, "&")) {
+    query++;
+    if (!strncmp(query, name, length) && query[length] == '=') {
+      return 1;
+    }
+  }
+  return 0;
+}
+
 /* NULL, or why a client would not send the URL as it stands here: the signature covers the bytes that are sent. */
 static const char *why_not(const char *url, const char *target) {
   for (const unsigned char *at = (const unsigned char *)url; *at; at++) {
@@ -37,7 +49,11 @@ static const char *why_not(const char *url, const char *target) {
       return "its path has a dot segment, which clients remove";
     }
   }
-  return strstr(target + path, "signature=") || strstr(target + path, "expires=") ? "it is signed already" : NULL;
+  const char *query = target + path;
+  return has_parameter(query, "signature") ? "it is signed already"
+         : has_parameter(query, "expires") || has_parameter(query, "key")
+             ? "signing adds the parameters key and expires; remove them from the URL"
+             : NULL;
 }
 
 int cli_run_sign(cli *c) {
@@ -53,12 +69,14 @@ int cli_run_sign(cli *c) {
     return CLI_USAGE;
   }
   if (!colon || colon == key || !colon[1]) {
-    cli_error(c, "--key takes KEY:SECRET, as orbmorphd key add prints it");
+    cli_error(c, "--key or $ORBMORPH_KEY takes KEY:SECRET, as orbmorphd key add prints it");
     return CLI_USAGE;
   }
-  long long until = moment(c->args.value[OPT_EXPIRES]);
+  const char *expires = c->args.value[OPT_EXPIRES];
+  long long until = moment(expires);
   if (!until) {
-    cli_error(c, "--expires takes a number of days, hours or minutes, such as 30d, 12h or 90m");
+    cli_error(c, "--expires %s a number of days, hours or minutes, such as 30d, 12h or 90m",
+              expires ? "takes" : "is missing; it takes");
     return CLI_USAGE;
   }
   char *whole =

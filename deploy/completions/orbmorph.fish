@@ -124,7 +124,7 @@ complete -c orbmorph -n '__fish_seen_subcommand_from view' -l frames -r -d 'draw
 complete -c orbmorph -n __fish_use_subcommand -f -a sign -d 'Sign the URL of a morph, so that a browser can load it without a token'
 complete -c orbmorph -n '__fish_seen_subcommand_from sign' -l help -s h -d 'show this help'
 complete -c orbmorph -n '__fish_seen_subcommand_from sign' -l key -s k -r -d 'signing key; default: $ORBMORPH_KEY'
-complete -c orbmorph -n '__fish_seen_subcommand_from sign' -l expires -r -d 'time until the signature expires, such as 30d, 12h or 90m'
+complete -c orbmorph -n '__fish_seen_subcommand_from sign' -l expires -r -d 'required: time until the signature expires, such as 30d, 12h or 90m'
 complete -c orbmorph -n __fish_use_subcommand -f -a studio -d 'Start a daemon on a free port and open the studio in the browser'
 complete -c orbmorph -n '__fish_seen_subcommand_from studio' -l quiet -s q -d 'print no progress and no notes'
 complete -c orbmorph -n '__fish_seen_subcommand_from studio' -l help -s h -d 'show this help'

@@ -89,6 +89,21 @@ test('wrong usage exits with 2 and explains the error', async () => {
     assert.equal(code, 2, `${args}: ${code} ${err}`);
     assert.ok(err.length > 0 && out === '', `${args}`);
   }
+  for (const [args, why] of [
+    [['--foo'], /^orbmorph: unknown option '--foo'\n/],
+    [['morph', dog, giraffe, landmarks], /dog-giraffe.json has landmarks, not a mesh: .* --landmarks /],
+    [['morph', dog, giraffe, '--transfer', '5:skin'], /there is no shape 5; the files are shapes 0 to 1/],
+    [['morph', dog, giraffe, '--transfer', '1:texture:8'], /whole number from 16 to 8192/],
+    [['sign', '/v1/morph.glb?shapes=a,b', '--key', 'web:f00d'], /--expires is missing/],
+    [['sign', 'http://x/y?expires=3', '--key', 'web:f00d'], /adds the parameters key and expires/],
+    [['sign', 'http://x/y?signature=3', '--key', 'web:f00d'], /signed already/],
+    [['get', '0'.repeat(64), '-o', 'x.glb'], /x\.json; add --part asset/],
+    [['get', `/v1/supermeshes/${'0'.repeat(64)}/places`, '-o', 'p.json'], /p\.bin$/m],
+  ]) {
+    const { code, err } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
+    assert.equal(code, 2, err);
+    assert.match(err, why);
+  }
   const help = await run(['--help']);
   assert.equal(help.code, 0);
   for (const name of ['morph', 'upload', 'embed', 'merge', 'job', 'ls', 'get', 'rm', 'doctor', 'view', 'studio']) {
@@ -187,6 +202,24 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   const asset = await run(['get', id, '--part', 'asset', '-o', path.join(at, 'x.glb')], { env });
   assert.equal(asset.code, 0, asset.err);
   assert.equal(morphOf(await readFile(path.join(at, 'x.glb'))).gltf.animations, undefined, '--set reached the daemon');
+  for (const [tail, name] of [
+    ['places', 'p.bin'],
+    ['asset.glb', 'z.glb'],
+    ['spheres/1.ply', 'y.ply'],
+  ]) {
+    const saved = await run(['get', `/v1/supermeshes/${id}/${tail}`, '-o', path.join(at, name)], { env });
+    assert.equal(saved.code, 0, saved.err);
+    const { bytes } = await d.get(`/v1/supermeshes/${id}/${tail}`);
+    assert.ok(bytes.equals(await readFile(path.join(at, name))), tail);
+  }
+  for (const [operand, part, why] of [
+    [meshes[0].id, 'asset', /asset is for supermeshes; this is one of the meshes, whose data is --part file/],
+    [`/v1/supermeshes/${id}`, 'file', /file is for meshes; this is one of the supermeshes, whose data is --part asset/],
+  ]) {
+    const { code, err } = await run(['get', operand, '--part', part], { env });
+    assert.equal(code, 1, err);
+    assert.match(err, why);
+  }
   const packed = await run(['get', id, '--part', 'asset', '--profile', 'meshopt'], { env });
   assert.ok(packed.bytes.equals((await d.get(`/v1/supermeshes/${id}/asset.glb?profile=meshopt`)).bytes), packed.err);
   const made = path.join(at, 'q.glb');
@@ -601,11 +634,13 @@ test('studio says what to do where no browser opens, and with a file that is ref
   const ended = new Promise((resolve) => child.on('exit', resolve));
   child.kill('SIGINT');
   assert.equal(await ended, 0);
+  assert.doesNotMatch(err, /"level"/, 'the log of the daemon stays out of the terminal');
   const ring = path.join(at, 'ring.obj');
   await writeFile(ring, shapes.obj(shapes.torus()));
   const refused = await run(['studio', '--no-open', '--data', path.join(at, 'data'), ring], {});
   assert.equal(refused.code, 1, refused.err);
   assert.match(refused.err, /not-genus-zero[\s\S]*start it without this file, and drop the file on its page/);
+  assert.doesNotMatch(refused.err, /"level"/);
 });
 
 test('studio starts a daemon of its own on a free port, uploads files and opens the browser', async (t) => {
