@@ -167,8 +167,10 @@ static int set(config *out, const entry *e, const char *value, const char *from)
   int64_t number;
   int is_default = strcmp(value, e->standard) == 0; /* a default of 0 may lie outside the range: "by the machine" */
   if (!config_number(value, &number) || (!is_default && (number < e->least || number > e->most))) {
-    config_complain("%s: %s must be a number from %lld to %lld, not \"%s\"", from, e->name, (long long)e->least,
-                    (long long)e->most, value);
+    int64_t standard; /* worth naming where it lies outside the range */
+    int apart = config_number(e->standard, &standard) && (standard < e->least || standard > e->most);
+    config_complain("%s: %s must be %s%sa number from %lld to %lld, not \"%s\"", from, e->name,
+                    apart ? e->standard : "", apart ? " or " : "", (long long)e->least, (long long)e->most, value);
     return 0;
   }
   memcpy(at, &number, sizeof number);

@@ -22,6 +22,7 @@
 #include "maintain.h"
 #include "migrate.h"
 #include "parts.h"
+#include "store/place.h"
 #include "systemd.h"
 #include "worker/confined.h"
 #include "worker/pool.h"
@@ -261,6 +262,20 @@ static int run(const command_line *line) {
   return result;
 }
 
+/* Whether work on what is stored finds it: opening a mistyped folder would make an empty catalogue there. A node that
+ * shares a catalogue in PostgreSQL may have a new folder. */
+static int finds_data(const admin_command *admin, config_action action, const config *options) {
+  int fine = config_catalogue(options) || place_is_data(options->data) ||
+             (admin->kind ? !admin_command_needs_data(admin) : action == CONFIG_RUN);
+  if (!fine) {
+    log_error(
+        "%s is no data folder: it does not exist, cannot be read, or has no catalogue. Name that of the daemon with "
+        "--data",
+        options->data);
+  }
+  return fine;
+}
+
 /* Does what needs the lock of the data folder: a command that no running daemon took, --check-data, --gc. */
 static int work_alone(const admin_command *admin, config_action action, const config *options) {
   return admin->kind                   ? admin_command_run(admin, options)
@@ -311,6 +326,9 @@ int main(int argc, char **argv) {
       break;
   }
   int asked = admin_command_ask(&admin, &options);
+  if (asked < 0 && !finds_data(&admin, action, &options)) {
+    return CONFIG_UNFIT;
+  }
   int lock = asked < 0 ? folder_lock_data(options.data) : -1;
   if (lock < 0 && asked < 0) { /* the daemon may have just been starting */
     asked = admin_command_ask(&admin, &options);

@@ -50,6 +50,11 @@ static int wrong(const admin_kind *kind, const char *subject, const char *why) {
   return 0;
 }
 
+static int wrong_value(const admin_kind *kind, const admin_flag *flag, const char *value) {
+  fprintf(stderr, "orbmorphd %s: %s takes %s, not \"%s\"\n%s", kind->name, flag->name, flag->takes, value, kind->usage);
+  return 0;
+}
+
 static int wrong_verb(const admin_kind *kind) {
   char why[128] = "the command must be ";
   for (const admin_verb *verb = kind->verbs; verb->name; verb++) {
@@ -86,6 +91,10 @@ static int fill_words(admin_command *command) {
   return 1;
 }
 
+int admin_command_needs_data(const admin_command *command) {
+  return command->kind && !command->verb->makes;
+}
+
 int admin_command_read(admin_command *out, const admin_kind *kind, int *argc, char **argv) {
   const admin_verb *verb = kind->verbs;
   char word[ADMIN_WORD];
@@ -109,8 +118,10 @@ int admin_command_read(admin_command *out, const admin_kind *kind, int *argc, ch
     int flag = find_flag(out, argv[i]);
     if (flag < 0) {
       argv[kept++] = argv[i];
-    } else if (++i == *argc || !kind->flags[flag].read(argv[i], out->words[flag])) {
-      return wrong(kind, "", kind->values);
+    } else if (++i == *argc) {
+      return wrong(kind, argv[i - 1], " needs a value");
+    } else if (!kind->flags[flag].read(argv[i], out->words[flag])) {
+      return wrong_value(kind, &kind->flags[flag], argv[i]);
     }
   }
   *argc = kept;

@@ -21,6 +21,7 @@ typedef struct admin_verb {
   const char *name; /* at most 7 bytes; NULL ends the table */
   int named;        /* the command takes NAME */
   int shows_secret; /* the command shows the new secret, this one time */
+  int makes;        /* the command makes something, so the data folder may be new */
 } admin_verb;
 
 typedef struct admin_flag {
@@ -31,13 +32,13 @@ typedef struct admin_flag {
   /* Makes the word, without blanks, from the flag's value. The word is "" before the first value, so that a flag may be
    * given repeatedly. 0: the value is not valid. */
   int (*read)(const char *value, char word[ADMIN_WORD]);
+  const char *takes; /* the values that it takes, for the message about another one */
 } admin_flag;
 #define ADMIN_SECRET_WORD ""
 
 typedef struct admin_kind {
   const char *name;   /* "token": the first word of the line */
   const char *usage;  /* lines of the commands */
-  const char *values; /* the values that the flags take */
   int takes_ids;      /* NAME may be an id, which has 64 letters */
   const char *holder; /* the flag that names what verbs without NAME are about; NULL: none */
   admin_verb verbs[ADMIN_VERBS];
@@ -57,6 +58,9 @@ typedef struct admin_command {
 
 /* The kind of the name; NULL if there is none. The last kind of the table is NULL. */
 const admin_kind *admin_kind_named(const admin_kind *const *kinds, const char *name);
+
+/* Whether the command is about what a data folder has already. */
+int admin_command_needs_data(const admin_command *command);
 
 /* Removes the command's own words from argv (which begins with the program and the kind); the program and the options
  * of the daemon stay, and *argc becomes their number. 0 with the reason on standard error. */

@@ -22,8 +22,7 @@ const admin_kind admin_crash = {
         "  orbmorphd crash list | crash clear NAME\n"
         "                                 work whose processes died; NAME: the beginning of its key or of its\n"
         "                                 mesh, or the tenant: after three deaths it is refused until cleared\n",
-    .values = "crash takes no flags",
     .takes_ids = 1,
-    .verbs = {{"list", 0, 0}, {"clear", 1, 0}},
+    .verbs = {{"list", 0, 0, 0}, {"clear", 1, 0, 0}},
     .apply = apply,
 };

@@ -99,16 +99,13 @@ const admin_kind admin_key = {
         " [--cpu-seconds-per-day N]\n"
         "  orbmorphd key rotate NAME [--overlap 7d]\n"
         "  orbmorphd key list | key remove NAME\n",
-    .values =
-        "--origin takes an origin such as https://app.example.org, --tenant a name, --overlap a time such as "
-        "7d or 12h, the others a number",
-    .verbs = {{"add", 1, 1}, {"rotate", 1, 1}, {"list", 0, 0}, {"remove", 1, 0}},
-    .flags = {{"--requests-per-day", ADD, 0, "0", admin_read_number},
-              {"--cpu-seconds-per-day", ADD, 0, "0", admin_read_number},
-              {"--overlap", ROTATE, 0, ADMIN_OVERLAP, admin_read_span},
-              {"--tenant", ADD, 0, "-", admin_read_name},
+    .verbs = {{"add", 1, 1, 1}, {"rotate", 1, 1, 0}, {"list", 0, 0, 0}, {"remove", 1, 0, 0}},
+    .flags = {{"--requests-per-day", ADD, 0, "0", admin_read_number, "a whole number"},
+              {"--cpu-seconds-per-day", ADD, 0, "0", admin_read_number, "a whole number"},
+              {"--overlap", ROTATE, 0, ADMIN_OVERLAP, admin_read_span, "a time such as 7d or 12h"},
+              {"--tenant", ADD, 0, "-", admin_read_name, "a name of 1 to 63 letters, digits, '-', '_' and '.'"},
               {.name = ADMIN_SECRET_WORD},
-              {"--origin", ADD, 0, "-", read_origin}},
+              {"--origin", ADD, 0, "-", read_origin, "an origin such as https://app.example.org"}},
     .make_secret = make_secret,
     .apply = apply,
 };

@@ -146,18 +146,14 @@ const admin_kind admin_token = {
         "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-derived …] [--quota-jobs …] [--priority …]"
         " [--expires …]\n"
         "  orbmorphd token list | token remove NAME\n",
-    .values =
-        "--scope takes read, write and admin, comma-separated; --tenant takes a name; --expires takes a time such as "
-        "30d, a day "
-        "such as 2027-01-31, or never; the others a number",
-    .verbs = {{"add", 1, 1}, {"set", 1, 0}, {"list", 0, 0}, {"remove", 1, 0}},
-    .flags = {{"--scope", ADD | SET, ADD, "-1", read_scopes},
-              {"--quota", ADD | SET, 0, "-1", admin_read_number},
-              {"--quota-jobs", ADD | SET, 0, "-1", admin_read_number},
-              {"--priority", ADD | SET, 0, "-1", read_priority},
-              {"--tenant", ADD, 0, "-", admin_read_name},
-              {"--expires", ADD | SET, 0, "-1", read_expires},
-              {"--quota-derived", ADD | SET, 0, "-1", admin_read_number},
+    .verbs = {{"add", 1, 1, 1}, {"set", 1, 0, 0}, {"list", 0, 0, 0}, {"remove", 1, 0, 0}},
+    .flags = {{"--scope", ADD | SET, ADD, "-1", read_scopes, "read, write and admin, separated by commas"},
+              {"--quota", ADD | SET, 0, "-1", admin_read_number, "a number of bytes, such as 500M or 20G"},
+              {"--quota-jobs", ADD | SET, 0, "-1", admin_read_number, "a whole number"},
+              {"--priority", ADD | SET, 0, "-1", read_priority, "a number from 0 to 9"},
+              {"--tenant", ADD, 0, "-", admin_read_name, "a name of 1 to 63 letters, digits, '-', '_' and '.'"},
+              {"--expires", ADD | SET, 0, "-1", read_expires, "a time such as 30d, a day such as 2027-01-31, or never"},
+              {"--quota-derived", ADD | SET, 0, "-1", admin_read_number, "a number of bytes, such as 500M or 20G"},
               {.name = ADMIN_SECRET_WORD}},
     .make_secret = make_token,
     .apply = apply,

@@ -125,16 +125,14 @@ const admin_kind admin_webhook = {
         "  orbmorphd webhook rotate NAME [--overlap 7d]\n"
         "  orbmorphd webhook secret [--tenant NAME]\n"
         "  orbmorphd webhook list | webhook remove NAME\n",
-    .values =
-        "--url takes an https:// or http:// URL of at most 511 bytes, --events a list of succeeded, failed and "
-        "cancelled, "
-        "--tenant a name, --overlap a time such as 7d or 12h",
     .holder = "--tenant", /* whose secret it is */
-    .verbs = {{"add", 1, 1}, {"rotate", 1, 1}, {"remove", 1, 0}, {"list", 0, 0}, {"secret", 0, 0}},
-    .flags = {{"--url", ADD, ADD, "-", read_url},
-              {"--events", ADD, 0, "succeeded,failed,cancelled", read_event_list},
-              {"--overlap", ROTATE, 0, ADMIN_OVERLAP, admin_read_span},
-              {"--tenant", ADD | SECRET, 0, "-", admin_read_name},
+    .verbs = {{"add", 1, 1, 1}, {"rotate", 1, 1, 0}, {"remove", 1, 0, 0}, {"list", 0, 0, 0}, {"secret", 0, 0, 1}},
+    .flags = {{"--url", ADD, ADD, "-", read_url, "an https:// or http:// URL of at most 511 bytes"},
+              {"--events", ADD, 0, "succeeded,failed,cancelled", read_event_list,
+               "succeeded, failed and cancelled, separated by commas"},
+              {"--overlap", ROTATE, 0, ADMIN_OVERLAP, admin_read_span, "a time such as 7d or 12h"},
+              {"--tenant", ADD | SECRET, 0, "-", admin_read_name,
+               "a name of 1 to 63 letters, digits, '-', '_' and '.'"},
               {.name = ADMIN_SECRET_WORD}},
     .make_secret = make_secret,
     .apply = apply,

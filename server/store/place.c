@@ -185,6 +185,10 @@ int place_has_catalogue(const char *data) {
   return place_has(data, "catalogue.sqlite");
 }
 
+int place_is_data(const char *data) {
+  return place_has_catalogue(data) || place_has(data, place_catalogue) || place_has(data, place_new_catalogue);
+}
+
 /* Checks what can be checked before the catalogue is opened, which may create it. here: the mark of the data folder. */
 static store_result match_bucket(const store_place *p, const char *here, const char *owner) {
   if (strncmp(owner, PLACE_MIGRATING, strlen(PLACE_MIGRATING)) == 0) {

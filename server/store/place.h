@@ -36,6 +36,8 @@ int place_is_unfinished(const char *data);
 /* Whether the data folder has objects in files, and whether it has a catalogue in SQLite. */
 int place_has_files(const char *data);
 int place_has_catalogue(const char *data);
+/* Whether the folder has a catalogue, knows one in PostgreSQL, or is being filled with one. */
+int place_is_data(const char *data);
 /* What a bucket's owner begins with while `orbmorphd migrate` fills the bucket. */
 #define PLACE_MIGRATING "migrating-"
 

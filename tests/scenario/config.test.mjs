@@ -1,7 +1,7 @@
 // The daemon refuses a configuration that cannot work before it uses it, and says what to change.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdtempSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
@@ -50,6 +50,30 @@ test('values that no daemon can use are refused by name', () => {
     ['--log-level', 'warn', '--log-format', 'text'],
   ])
     assert.equal(check(...args).status, 0, args.join(' '));
+});
+
+test('refusals name the option, the value and what it takes', () => {
+  for (const [args, why] of [
+    [['--check-config', '--workers', '300'], /workers must be 0 or a number from 1 to 256, not "300"/],
+    [['token', 'set', 'x', '--quota', '12X'], /--quota takes a number of bytes.*, not "12X"/],
+    [['token', 'set', 'x', '--quota'], /--quota needs a value/],
+  ]) {
+    const { status, stderr } = spawnSync(binaries.daemon, args, { encoding: 'utf8' });
+    assert.equal(status, 2, args.join(' '));
+    assert.match(stderr, why);
+  }
+});
+
+test('commands about what is stored make no data folder', (t) => {
+  const folder = mkdtempSync(path.join(tmpdir(), 'orbmorph-test-'));
+  t.after(() => rmSync(folder, { recursive: true }));
+  for (const data of [folder, path.join(folder, 'typo')])
+    for (const command of [['--check-data'], ['--gc'], ['token', 'list'], ['key', 'remove', 'x'], ['crash', 'list']]) {
+      const { status, stderr } = spawnSync(binaries.daemon, [...command, '--data', data], { encoding: 'utf8' });
+      assert.equal(status, 78, command.join(' '));
+      assert.match(stderr, /is no data folder.*--data/);
+    }
+  assert.deepEqual([readdirSync(folder), existsSync(path.join(folder, 'typo'))], [[], false]);
 });
 
 test('a line of the file without a value is refused', (t) => {

@@ -163,7 +163,7 @@ test('keys are added, rotated and removed while the daemon runs', async (t) => {
     [['key', 'add', 'a b'], /NAME must have/],
     [['key', 'add', 'x', '--origin', 'a.example'], /--origin takes/],
     [['key', 'add', 'x', '--origin', 'https://a.example/'], /--origin takes/],
-    [['key', 'rotate', 'x', '--overlap', 'soon'], /--overlap a time/],
+    [['key', 'rotate', 'x', '--overlap', 'soon'], /--overlap takes a time such as .*, not "soon"/],
     [['key', 'sign'], /add, rotate, list or remove/],
   ]) {
     const ran = await runProgram(binaries.daemon, [...words, '--data', d.data]);
