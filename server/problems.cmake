@@ -1,13 +1,15 @@
 # A page for each problem type, made from the sections of docs/troubleshooting.md, so that the `type` of a problem is a
 # working link. Appends to the lists of pages.cmake: OUT (a prefix of paths), TROUBLESHOOTING (the file).
 
-# Converts the Markdown that those sections use to HTML: paragraphs, `code`, *words*, links (text only).
+# Converts the Markdown that those sections use to HTML: paragraphs, `code`, *words*, links to other sections, and the
+# text of links to documents, which the daemon does not serve.
 function(orb_html markdown result)
   string(STRIP "${markdown}" text)
   string(REPLACE "&" "&amp;" text "${text}")
   string(REPLACE "<" "&lt;" text "${text}")
   string(REPLACE ">" "&gt;" text "${text}")
   string(REGEX REPLACE "`([^`]+)`" "<code>\\1</code>" text "${text}")
+  string(REGEX REPLACE "\\[([^]]+)\\]\\(#([a-z-]+)\\)" "<a href=\"/problems/\\2\">\\1</a>" text "${text}")
   string(REGEX REPLACE "\\[([^]]+)\\]\\([^)]+\\)" "\\1" text "${text}")
   string(REGEX REPLACE "\\*([A-Z][^*]+)\\*" "<em>\\1</em>" text "${text}")
   string(REGEX REPLACE "\n\n+" "</p>\n<p>" text "${text}")

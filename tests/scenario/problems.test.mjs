@@ -39,6 +39,8 @@ test('the type of every problem leads to its section', async (t) => {
       .replaceAll('&gt;', '>')
       .replaceAll('&amp;', '&');
     assert.match(shown, new RegExp(`orbmorph: ${name}\\n`));
+    for (const [, other] of section.matchAll(/\]\(#([a-z-]+)\)/g))
+      assert.ok(reply.bytes.includes(`<a href="/problems/${other}">`), `${name} links to ${other}`);
     for (const line of section.split('\n').filter((l) => l && !/[`*[]/.test(l)))
       assert.ok(shown.includes(line), `${name}: ${line}`);
     for (const other of sections.keys())
