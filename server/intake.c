@@ -87,6 +87,9 @@ static int check(const task_head *task, const unsigned char *bytes, orb_context 
     fine = !json->failed || api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   } else {
     api_problem_of_error(orb_context_error(ctx), problem);
+    if (orb_context_error(ctx)->status == ORB_E_BAD_OPTION) { /* other options were checked when the request came */
+      api_json_member_string(&problem->facts, "member", "part");
+    }
   }
   orb_mesh_free(ctx, &mesh);
   return fine;

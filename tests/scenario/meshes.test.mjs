@@ -161,6 +161,7 @@ test('repairs that change the shape happen only on request', async (t) => {
   const one = await d.upload(obj(ball(2)), { part: 4 });
   assertProblem(one, 422, 'bad-option');
   assert.match(one.json.detail, /one piece and has no part 4/);
+  assert.equal(one.json.member, 'part');
   assertProblem(await d.upload(named, { part: 'two', repair: 'none' }), 400, 'bad-query');
   const unknown = await d.upload(open, { repair: 'magic' });
   assert.equal(unknown.status, 400, unknown.bytes.toString());
