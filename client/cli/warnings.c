@@ -9,6 +9,7 @@
 static const double ENERGY_MOST = 2, MEDIAN_MOST = 1.5;
 static const double INVERTED_MOST = 0.005;     /* of the triangles */
 static const double CONFIDENCE_LEAST = 0.3;    /* of a found landmark */
+static const double CLEAR = 0.5;               /* match.clear below it lowers the confidence of all found landmarks */
 static const double TOLERANCE_ROUNDING = 1.01; /* a proved bound may exceed the tolerance by rounding */
 static const double THIN_MOST = 0.01;          /* of the surface: a patch or two are hardly visible */
 static const double TURNED_OVER = 60;          /* degrees of the y axis */
@@ -129,32 +130,55 @@ static const char *paired_part(const cJSON *supermesh) {
   return NULL;
 }
 
-static int warn_of_match(FILE *out, const char *bullet, const cJSON *supermesh) {
+/* The factor by which all found landmarks are less certain because another match is nearly as good. 1: there is none,
+ * or a shape was matched as a part, of which the other matches say nothing. */
+static double rivalled(const cJSON *supermesh) {
   const cJSON *match = member(supermesh, "match");
+  double clear = cli_number(match, "clear");
+  return cJSON_IsTrue(member(match, "part")) || !(clear < CLEAR) ? 1 : clear / CLEAR;
+}
+
+static void print_choice(FILE *out, const cJSON *supermesh) {
   int others = cJSON_GetArraySize(member(supermesh, "alternatives"));
-  if (strcmp(cli_string(match, "verdict", ""), "unsure") != 0) { /* also where there is none: landmarks were given */
+  if (others > 1) {
+    fprintf(out, "Set landmarks, or send one of the %d requests in `alternatives` (Next match in the studio).\n",
+            others);
+  } else {
+    fputs(others ? "Set landmarks, or send the request in `alternatives` (Next match in the studio).\n"
+                 : "Set landmarks.\n",
+          out);
+  }
+}
+
+static int warn_of_match(FILE *out, const char *bullet, const cJSON *supermesh) {
+  static const char rival[] = "nother match is nearly as good, as where a shape looks alike from several sides. ";
+  const cJSON *match = member(supermesh, "match");
+  const int is_unsure = strcmp(cli_string(match, "verdict", ""), "unsure") == 0; /* 0 also if landmarks were given */
+  const int has_rival = rivalled(supermesh) < CONFIDENCE_LEAST;                  /* makes all landmarks uncertain */
+  const char *part = paired_part(supermesh);
+  if (!is_unsure && !has_rival) {
     return 0;
   }
-  const char *part = paired_part(supermesh);
-  fprintf(out, "%sNot sure: the shapes may be matched wrongly", bullet);
-  if (part) {
-    fprintf(out, ", such as a left %s with a right one", part);
-  }
-  fprintf(out, " (confidence %.2f). ", cli_hundredths(cli_number(match, "confidence")));
-  if (others > 1) {
-    fprintf(out, "Set landmarks, or send one of the %d requests in `alternatives`.\n", others);
+  if (is_unsure) {
+    fprintf(out, "%sNot sure: the shapes may be matched wrongly%s%s%s (confidence %.2f)%s", bullet,
+            part ? ", such as a left " : "", part ? part : "", part ? " with a right one" : "",
+            cli_hundredths(cli_number(match, "confidence")), has_rival ? "; a" : ". ");
   } else {
-    fputs(others ? "Set landmarks, or send the request in `alternatives`.\n" : "Set landmarks.\n", out);
+    fprintf(out, "%sA", bullet);
   }
+  fputs(has_rival ? rival : "", out);
+  print_choice(out, supermesh);
   return 1;
 }
 
+/* Where the map nearby is bad: what another match takes from the confidence says nothing of the map. */
 static int warn_of_landmarks(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const double factor = rivalled(supermesh);
   const cJSON *landmark;
   int count = 0;
   cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
     double confidence = cli_number(landmark, "confidence");
-    if (confidence < CONFIDENCE_LEAST) { /* not if it is NAN: landmarks of the request have none */
+    if (confidence < CONFIDENCE_LEAST * factor) { /* not if it is NAN: landmarks of the request have none */
       fprintf(out, "%s%s%s (%.2g)", count ? ", " : bullet,
               count ? "" : "The map is bad around these found landmarks; set them by hand: ",
               cli_string(landmark, "name", "?"), confidence);

@@ -440,7 +440,7 @@ export type Supermesh = {
     at: Place[];
     /** One distance for each shape. */
     residual_relative: Array<number | null>;
-    /** From 0 to 1. */
+    /** From 0 to 1. It falls as the map nearby stretches. Where another match is nearly as good (match.clear below 0.5), those of all landmarks are multiplied by 2 · match.clear, unless match.part is true. */
     confidence: number | null;
   }>;
   /** The alignment, for align.start of a request with other landmarks. Absent if an older engine made the supermesh. */
