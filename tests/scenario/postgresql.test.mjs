@@ -86,7 +86,7 @@ test('a data folder and a catalogue stay together', async (t) => {
   refused(start(d.data, 'sqlite'), /is in PostgreSQL/);
   refused(start(d.data, catalogue(other)), /belong to another catalogue/);
   const plain = await folder(t);
-  spawnSync(program, ['token', 'list', '--data', plain]); // makes a catalogue in SQLite
+  spawnSync(program, ['token', 'add', 'x', '--scope', 'read', '--data', plain]); // makes a catalogue in SQLite
   refused(start(plain, catalogue(plain)), /catalogue in SQLite/);
   for (const command of ['backup', 'restore']) {
     const copy = spawnSync(program, [command, other, '--data', d.data, '--catalogue', catalogue(d.data)], {
