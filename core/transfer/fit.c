@@ -24,10 +24,11 @@ static const double LIKE = 0.01;
  * right but unsure, with z up, have 2° to 13°, 0.02 to 0.11 and 0.02 to 0.17. Matches whose head goes to a leg have 27°
  * to 41°; where a man stands along the back of a dog, 15° to 19° and 0.16 to 0.2 of the spread. */
 static const double AXES_DEGREES = 15, AXES_OFF = 0.13, AXES_LEFT = 0.25;
-/* AUTO_UNSURE: a shape whose places correspond to opposite ones of the first shape, so that it would shrink to less
- * than two fifths of its spread on the way (1.2 here), is rotated if that leaves at most this share of the spread, as
- * it does of shapes without limbs (a tetrahedron and an icosahedron: 0.05), or if the shape then still stands upright,
- * within these degrees. */
+/* AUTO_UNSURE: a shape is rotated if its places correspond to opposite ones of the first shape, and rotating leaves
+ * little, or leaves the shape upright. Opposite: without a rotation, the squared distances are this many times the
+ * spread or more, so that the shape shrinks to two fifths of its spread on the way, or less. Little: at most this share
+ * of the spread. Upright: its y axis within these degrees. First guesses, looked at on a tetrahedron and an icosahedron
+ * (1.32, 0.05 and 125°) and on a boat and an armadillo, which stay (0.68). */
 static const double OPPOSITE = 1.2, OPPOSITE_OFF = 0.1, OPPOSITE_UP = 60;
 
 /* Weighted points of both shapes. index NULL: all vertices; weight NULL: 1. */

@@ -52,12 +52,19 @@ static orb_status smooth_targets(orb_map_run *c) {
   return status;
 }
 
+/* Sets the smooth targets. *given, *smooth: the flips of a start from the targets as they were, and from these. */
+static orb_status try_smooth_targets(orb_map_run *c, int32_t *given, int32_t *smooth) {
+  ORB_TRY(orb_map_start_flips(c, given));
+  ORB_TRY(smooth_targets(c));
+  return orb_map_start_flips(c, smooth);
+}
+
 /* Sets the targets of the first start: the smooth ones, or those as given if they fold it less, for example if limbs
  * lie beside each other and a registration in space moves them together. Walks take samples of the targets themselves.
  * Targets drawn by landmarks stay as given, unless the map crumples: smooth ones fold most starts of people with
  * landmarks more. */
 static orb_status register_first(orb_map_run *c) {
-  int32_t smooth, given;
+  int32_t given, smooth;
   ORB_TRY(orb_map_register(c, 0));
   if (c->walks_first) { /* walks have levels of their own */
     return ORB_OK;
@@ -66,9 +73,7 @@ static orb_status register_first(orb_map_run *c) {
   if (c->pairs.landmarks > 0) {
     return ORB_OK;
   }
-  ORB_TRY(orb_map_start_flips(c, &given));
-  ORB_TRY(smooth_targets(c));
-  ORB_TRY(orb_map_start_flips(c, &smooth));
+  ORB_TRY(try_smooth_targets(c, &given, &smooth));
   c->starts_smooth = smooth < given;
   return c->starts_smooth ? ORB_OK : orb_map_register(c, 0);
 }
@@ -153,15 +158,13 @@ static orb_status run_passes(orb_map_run *c) {
 }
 
 /* A start from smooth targets, for a first map with landmarks whose energy lies in few triangles: the landmarks draw
- * the targets as given, from which thin parts such as fingers may crumple. Of 21 such maps, five gained, and none lost;
- * smooth targets that fold the start clearly more than those as given never helped. Of man and woman with 24
- * landmarks, which leave the fingers out, one hand had its fingers on other fingers, and half of the energy. */
+ * the targets as given, from which thin parts such as fingers may crumple. Smooth targets that fold the start
+ * clearly more than those as given never helped. Of man and woman with 24 landmarks, which leave the fingers out, one
+ * hand had its fingers on other fingers, and half of the energy. */
 static orb_status start_smooth(orb_map_run *c) {
   const double before = c->best_energy;
   int32_t given, smooth;
-  ORB_TRY(orb_map_start_flips(c, &given));
-  ORB_TRY(smooth_targets(c));
-  ORB_TRY(orb_map_start_flips(c, &smooth));
+  ORB_TRY(try_smooth_targets(c, &given, &smooth));
   if (smooth <= c->params.targets.smooth_flips * given) {
     allow(c);
     ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));

@@ -117,7 +117,8 @@ typedef struct orb_map_params {
     double uneven;  /* energy above 1 of a first map with landmarks, as a multiple of that by energy.bulk, above which
                        few triangles have much of it, and a start from smooth targets follows: of 76 maps of people and
                        animals, 14, of which four gained. Right maps without crumples have 1.5 to 2 */
-    double crumple; /* and its energy beyond that by energy.bulk */
+    double crumple; /* and its energy beyond that by energy.bulk: less is hardly worth a start. These three were chosen
+                       on people, animals and real pairs of both halves, with 8 and 24 landmarks */
     double smooth_flips; /* flips of that start, as a multiple of those of the first one, up to which it is made. The
                             starts that led to a better map had 0.04 to 1.23 */
     double crumpled;     /* energy of the first start up to which it is drawn at once */
