@@ -9,6 +9,7 @@
 #include "elastic/elastic.h"
 
 #include "base/check.h"
+#include "elastic/mend.h"
 #include "elastic/rough_map.h"
 #include "elastic/rounds.h"
 
@@ -35,11 +36,14 @@ end:
 }
 
 orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                              const orb_elastic_anchors *anchors, int rounds, orb_elastic_pose *pose) {
+                              const orb_elastic_anchors *anchors, int rounds, int mends, orb_elastic_pose *pose) {
   orb_registration r = {.ctx = ctx, .anchors = anchors, .pose = pose, .is_alone = 1};
   orb_status status;
   ORB_GO(status, orb_registration_create(ctx, a, b, &r), end);
-  status = orb_registration_rounds(&r, rounds, SETTLE_FIRST_REACH, SETTLE_LAST_REACH);
+  ORB_GO(status, orb_registration_rounds(&r, rounds, SETTLE_FIRST_REACH, SETTLE_LAST_REACH), end);
+  if (mends) {
+    status = orb_registration_mend(&r, SETTLE_LAST_REACH);
+  }
 end:
   orb_registration_free(&r);
   return status;

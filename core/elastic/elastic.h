@@ -15,6 +15,8 @@
  *   registration.h, rough_map.h, places.h, rounds.h
  *               what a registration holds, what pulls it, and its rounds
  *   elastic.h   the registration
+ *   ends.h      ends of limbs that a pose has crumpled
+ *   mend.h      which begin anew
  *   slide.h     along the other surface, from where a map takes the first one
  *   carry.h     its pose, for other points
  *
@@ -38,8 +40,10 @@ ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh 
                                                double *bend);
 
 /* Moves mesh a to the nearest places of mesh b, and its anchors to theirs, from a pose near them, in so many rounds, at
- * least 2. Changes the pose. On all threads. */
+ * least 2. Changes the pose. mends: hands and other ends of limbs that arrive crumpled begin anew (mend.h). On all
+ * threads. */
 ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
-                                             const orb_elastic_anchors *anchors, int rounds, orb_elastic_pose *pose);
+                                             const orb_elastic_anchors *anchors, int rounds, int mends,
+                                             orb_elastic_pose *pose);
 
 #endif

@@ -121,21 +121,32 @@ void orb_registration_pull_by_anchors(orb_registration *r) {
   }
 }
 
-double orb_registration_bend(const orb_registration *r) {
+/* Adds up the squared changes of the edges of v, and their squared lengths. */
+static void add_bend(const orb_registration *r, int32_t v, double *bend, double *length) {
   const orb_body *a = &r->a;
-  double bend = 0, length = 0;
-  for (int32_t v = 0; v < a->count; v++) {
-    const double *rotation = r->pose->rotation + 9 * (size_t)v;
-    for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
-      double p[3], q[3];
-      orb_sub(a->mesh->positions + 3 * (size_t)a->next[i], a->mesh->positions + 3 * (size_t)v, p);
-      orb_sub(r->pose->position + 3 * (size_t)a->next[i], r->pose->position + 3 * (size_t)v, q);
-      for (int k = 0; k < 3; k++) {
-        double d = q[k] - orb_dot(rotation + 3 * k, p);
-        bend += a->weight[i] * d * d;
-      }
-      length += a->weight[i] * orb_dot(p, p);
+  const double *rotation = r->pose->rotation + 9 * (size_t)v;
+  for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
+    double p[3], q[3];
+    orb_sub(a->mesh->positions + 3 * (size_t)a->next[i], a->mesh->positions + 3 * (size_t)v, p);
+    orb_sub(r->pose->position + 3 * (size_t)a->next[i], r->pose->position + 3 * (size_t)v, q);
+    for (int k = 0; k < 3; k++) {
+      double d = q[k] - orb_dot(rotation + 3 * k, p);
+      *bend += a->weight[i] * d * d;
     }
+    *length += a->weight[i] * orb_dot(p, p);
+  }
+}
+
+double orb_registration_bend_at(const orb_registration *r, int32_t v) {
+  double bend = 0, length = 0;
+  add_bend(r, v, &bend, &length);
+  return length > 0 ? bend / length : 0;
+}
+
+double orb_registration_bend(const orb_registration *r) {
+  double bend = 0, length = 0;
+  for (int32_t v = 0; v < r->a.count; v++) {
+    add_bend(r, v, &bend, &length);
   }
   return length > 0 ? bend / length : 0;
 }

@@ -55,5 +55,7 @@ ORB_MUST_CHECK orb_status orb_registration_solve(orb_registration *r, int again)
 
 /* Mean squared change of the edges of a against the rotations of their ends, relative to their squared lengths. */
 double orb_registration_bend(const orb_registration *r);
+/* The same for the edges of one vertex. */
+double orb_registration_bend_at(const orb_registration *r, int32_t v);
 
 #endif

@@ -175,7 +175,7 @@ static void anchors_reach_their_places(void **state) {
     for (int32_t i = 0; i < 9 * a.vertex_count; i++) {
       pose.rotation[i] = i % 9 % 4 == 0;
     }
-    assert_int_equal(orb_elastic_settle(ctx, &a, &b, with ? &anchors : NULL, 6, &pose), ORB_OK);
+    assert_int_equal(orb_elastic_settle(ctx, &a, &b, with ? &anchors : NULL, 6, 0, &pose), ORB_OK);
     for (int32_t i = 0; i < ANCHORS; i++) {
       away += away_from_place(&pose, &anchor[i]) / ANCHORS;
     }

@@ -136,8 +136,8 @@ static orb_status write_targets(orb_context *ctx, const orb_match *match, orb_tr
   }
   ORB_GO(status, orb_elastic_carry(ctx, &t->copy[s].mesh, &one->pose[s], fine->positions, fine->vertex_count, &pose),
          end);
-  const int rounds = bend_of(one, 1) > match->walks_above ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
-  ORB_GO(status, orb_elastic_settle(ctx, fine, &t->fine[1 - s].mesh, &held, rounds, &pose), end);
+  const int is_bent = bend_of(one, 1) > match->walks_above, rounds = is_bent ? ORB_FIND_SETTLE_BENT : ORB_FIND_SETTLE;
+  ORB_GO(status, orb_elastic_settle(ctx, fine, &t->fine[1 - s].mesh, &held, rounds, !is_bent, &pose), end);
   for (size_t i = 0; i < count; i++) {
     points[i] = (mesh->positions[i] - own->middle[i % 3]) * own->scale;
   }

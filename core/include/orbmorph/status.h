@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* The version of the algorithms; part of the key of each derived object. */
-#define ORB_ENGINE "orbmorph 1.0.0-37"
+#define ORB_ENGINE "orbmorph 1.0.0-38"
 
 typedef enum orb_status {
   ORB_OK = 0,
