@@ -13,10 +13,10 @@
 #include "support_context.h"
 #include "support_shapes.h"
 
-enum { FINGERS = 5, LEVELS = 5 };
+enum { FINGERS = 5, LEVELS = 4 };
 /* Heights, of which the ball of the body reaches from −2 to 2, and what lies above HAND is the hand. */
 static const double BALL = 2, WRIST = 3, TIP = 3.9, HAND = 3;
-static const double DRAWN = 8; /* how much denser the vertices are at the hand */
+static const double DRAWN = 14; /* how much denser the vertices are at the hand */
 
 /* Directions from the middle of the body to the tips of four fingers in a row and of a thumb beside them, before they
  * are scaled to length 1. The arm points along z. */
@@ -102,7 +102,7 @@ static double hand_off(const scene *s) {
       count++;
     }
   }
-  assert_true(count > 200);
+  assert_true(count > 60);
   return sum / count;
 }
 
@@ -113,7 +113,7 @@ static void a_crumpled_hand_opens(void **state) {
     scene s;
     open_scene(ctx, &s);
     assert_int_equal(orb_elastic_settle(ctx, &s.a, &s.b, NULL, 3, mends, &s.pose), ORB_OK);
-    assert_true(mends ? hand_off(&s) < 0.005 : hand_off(&s) > 0.06);
+    assert_true(mends ? hand_off(&s) < 0.01 : hand_off(&s) > 0.06);
     close_scene(ctx, &s);
   }
 }
@@ -217,7 +217,7 @@ static void memory_runs_out(void **state) {
   const int64_t calls = settle_rationed(INT64_MAX, &status);
   assert_int_equal(status, ORB_OK);
   assert_true(calls > 100);
-  for (int64_t at = 1; at <= calls; at += calls / 5) { /* the allocation of the context comes before these */
+  for (int64_t at = 1; at <= calls; at += calls / 12) { /* the allocation of the context comes before these */
     (void)settle_rationed(at, &status);
     assert_int_equal(status, ORB_E_NO_MEMORY);
   }
