@@ -502,7 +502,8 @@ static void a_twist_is_matched(void **state) {
   options.method = ORB_ALIGN_AUTO;
   options.preset = ORB_PRESET_DEFAULT;
   align_and_check(ctx, shapes, 2, NULL, 0, &options, &out);
-  assert_true(mean_error(ctx, bodies, GIVEN, &out) <= 0.012);
+  assert_true(mean_error(ctx, bodies, GIVEN, &out) <= 0.0021); /* 0.0023 with fingers on the palm, */
+  assert_true(out.energy < 1.06);                              /* and 1.073 */
   assert_true(out.match.lead > 1.5);
   assert_true(out.alternative_count > 0 && out.alternatives[0].cost > 1.5);
   orb_alignment_free(ctx, &out);
