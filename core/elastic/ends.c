@@ -12,7 +12,7 @@
 enum { CLUSTERS = 64 }; /* crumpled parts that are listed; a body has ten */
 enum { SMOOTHED = 4 };  /* rounds in which bends are smoothed over neighbours */
 /* Bend of a vertex's edges (orb_registration_bend()), smoothed, from which it is crumpled, and the least mean of a
- * part. Of seven pairs of people, hands whose fingers had gone astray had 0.14 to 0.38, and elbows and armpits 0.1. */
+ * part. Of seven pairs of people, hands whose fingers had gone astray had a mean of 0.14 to 0.38. */
 static const double CRUMPLED = 0.05, CRUMPLED_MEAN = 0.08;
 /* Areas of a part, as shares of that of a ball: a hand has 0.02, a belly more than MOST. LEAST goes with the square of
  * the scale. */
