@@ -16,7 +16,7 @@
  *               what a registration holds, what pulls it, and its rounds
  *   elastic.h   the registration
  *   ends.h      ends of limbs that a pose has crumpled
- *   mend.h      which begin anew
+ *   mend.h      registers these ends anew
  *   slide.h     along the other surface, from where a map takes the first one
  *   carry.h     its pose, for other points
  *

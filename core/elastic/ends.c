@@ -5,12 +5,14 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
-enum { CLUSTERS = 64 }; /* crumpled parts that are listed; a body has ten */
-enum { SMOOTHED = 4 };  /* rounds in which bends are smoothed over neighbours */
+enum { CLUSTERS = 64 };             /* crumpled parts that are listed, the first by number; a body has ten */
+enum { TRIED = 2 * ORB_ENDS_MOST }; /* of them, those with most area may be ends */
+enum { SMOOTHED = 4 };              /* rounds in which bends are smoothed over neighbours */
 /* Bend of a vertex's edges (orb_registration_bend()), smoothed, from which it is crumpled, and the least mean of a
  * part. Of seven pairs of people, hands whose fingers had gone astray had a mean of 0.14 to 0.38. */
 static const double CRUMPLED = 0.05, CRUMPLED_MEAN = 0.08;
@@ -196,7 +198,8 @@ static int is_taken(const search *s, const cluster *one, const orb_ends *ends) {
 }
 
 static orb_status take_ends(const search *s, orb_ends *out, int32_t *queue, unsigned char *waits) {
-  for (int32_t i = 0; i < s->count && out->count < ORB_ENDS_MOST; i++) {
+  for (int32_t i = 0; i < s->count && i < TRIED && out->count < ORB_ENDS_MOST; i++) {
+    ORB_TRY(orb_context_check(s->r->ctx));
     orb_end *end = &out->end[out->count];
     if (is_taken(s, &s->cluster[i], out)) {
       continue;

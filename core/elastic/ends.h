@@ -1,8 +1,8 @@
 /* Ends of limbs that a pose has crumpled, such as hands.
  *
- * Small copies have no fingers. So a hand that a coarse pose has turned by an eighth, or bent at the wrist, arrives
- * with its fingers on the palm of the other one, and closest points then crumple it. Along the surface, an end is what
- * lies beyond a wrist: a ring that the pose carries well. mend.h makes use of that. */
+ * Small copies have no fingers. So a hand that a coarse pose has turned by some tens of degrees, or bent at the wrist,
+ * arrives with its fingers on the palm of the other one, and closest points then crumple it. Along the surface, an end
+ * is what lies beyond a wrist: a ring that the pose carries well. mend.h starts from that ring. */
 #ifndef ORB_ELASTIC_ENDS_H
 #define ORB_ELASTIC_ENDS_H
 
@@ -28,7 +28,7 @@ typedef struct orb_ends {
 } orb_ends;
 
 /* Finds the ends of a registration that has settled. scale: 1 finds hands, 0.5 fingers too. Free `out` in any case.
- * O(n) for each end. */
+ * O(n) for each end on meshes whose triangles are not extremely long. */
 ORB_MUST_CHECK orb_status orb_ends_find(const orb_registration *r, double scale, orb_ends *out);
 void orb_ends_free(orb_context *ctx, orb_ends *ends);
 

@@ -26,6 +26,9 @@ static const double NORMALS = 0.1;
  * with 0.6, 0.75 and 0.85, 14, 16 and 18 come nearer to the truth and 2, 3 and 3 farther from it; with 24 landmarks 8,
  * 8 and 9, and 3, 5 and 9. */
 static const double BETTER = 0.6;
+/* The vertices of all pieces of a search together are at most this many times those of both meshes, which bounds the
+ * time where a dense part lies near several ends. Four limbs of a body have a third. */
+static const int64_t PIECES_MOST = 2;
 /* Scales of the ends: first whole hands, then what is left, such as two fingers on one. Without the second, 10 of the
  * 40 pairs come nearer instead of 16 (both with 0.75). */
 static const double SCALE[] = {1, 0.5};
@@ -253,12 +256,17 @@ static orb_status mend_ends(orb_registration *r, double scale, const orb_ends *e
   const size_t all = (size_t)r->a.count + (size_t)r->b.count;
   unsigned char *in = ORB_NEW(r->ctx, unsigned char, all);
   int32_t *number = ORB_NEW(r->ctx, int32_t, all);
+  int64_t taken = 0;
   orb_status status = in && number ? ORB_OK : ORB_E_NO_MEMORY;
   for (int32_t e = 0; e < ends->count && status == ORB_OK; e++) {
     mended *m = &w.one[w.count++];
     status = prepare(r, scale, &ends->end[e], in, number, m);
-    if (status == ORB_OK && (m->a.mesh.triangle_count == 0 || m->b.mesh.triangle_count == 0)) {
-      mended_free(r->ctx, m); /* nothing of the other mesh lies there */
+    const int64_t vertices = (int64_t)m->a.mesh.vertex_count + m->b.mesh.vertex_count;
+    const int is_empty = m->a.mesh.triangle_count == 0 || m->b.mesh.triangle_count == 0; /* nothing of b lies there */
+    if (status == ORB_OK && !is_empty && taken + vertices <= PIECES_MOST * (int64_t)all) {
+      taken += vertices;
+    } else if (status == ORB_OK) {
+      mended_free(r->ctx, m);
       *m = (mended){0};
       w.count--;
     }

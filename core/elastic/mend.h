@@ -10,8 +10,8 @@
 
 #include "elastic/registration.h"
 
-/* Changes the pose of a registration that has settled. reach: that of its last round. An end takes about 0.03 s. On all
- * threads, with the same result for any number of them. */
+/* Changes the pose of a registration that has settled. reach: that of its last round. An end with 600 vertices takes
+ * about 0.05 s of one thread. On all threads, with the same result for any number of them. */
 ORB_MUST_CHECK orb_status orb_registration_mend(orb_registration *r, double reach);
 
 #endif
